@@ -128,7 +128,6 @@ _NAMES = {
     "zones.units": "UnitHistory UnitSamples",
     "zones.zone": "Zone Zones",
 }
-"""Public names by the module that defines them."""
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 

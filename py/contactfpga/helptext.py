@@ -17,8 +17,6 @@ _MADE = {"property", "cached_property", "functools.cached_property"}
 
 
 class Field(NamedTuple):
-    """An attribute of a class, with its docstring."""
-
     name: str
     declared: str
     """Name, type and default, as far as the source states them."""
@@ -85,7 +83,6 @@ def _declared(body: list[ast.stmt]) -> Iterator[Field]:
 
 
 def _assigned(body: list[ast.stmt]) -> Iterator[Field]:
-    """Attributes that ``__init__`` assigns and documents."""
     for statement, following in itertools.pairwise(body):
         if not isinstance(statement, ast.Assign | ast.AnnAssign) or not _text(following):
             continue
@@ -96,6 +93,5 @@ def _assigned(body: list[ast.stmt]) -> Iterator[Field]:
 
 
 def _text(statement: ast.stmt) -> str:
-    """The docstring in a statement; "" if the statement is none."""
     value = statement.value if isinstance(statement, ast.Expr) else None
     return value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""

@@ -62,7 +62,6 @@ def sheet(
 
 
 def _box(x: float, y: float, columns: int, rows: int, pitch_mm: tuple[float, float], color: str) -> str:
-    """A block of cells, by its lower left corner."""
     pitch_x, pitch_y = pitch_mm
     place = f'x="{x * pitch_x:g}" y="{y * pitch_y:g}"'
     return f'<rect {place} width="{columns * pitch_x:g}" height="{rows * pitch_y:g}" fill="{color}"/>'
@@ -88,7 +87,6 @@ def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) 
 
 
 def radius_mm(area_mm2: float) -> float:
-    """Radius of the circle with this area."""
     return math.sqrt(area_mm2 / math.pi)
 
 

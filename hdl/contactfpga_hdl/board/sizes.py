@@ -108,7 +108,6 @@ def measure_netlists(
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """LUT4 of :func:`measure`, in seconds: without place and route."""
     return _packed(_rtlil(component()), device)[0]
 
 

@@ -40,7 +40,6 @@ FAMILIES = {
 
 
 def overrides(fpga: str) -> dict[str, str]:
-    """The commands as overrides of Amaranth's platforms."""
     family = _family(fpga)
     return {
         "synth_opts": family.options,

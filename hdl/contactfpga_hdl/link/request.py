@@ -16,7 +16,6 @@ _NUMBER, _WHAT = 1, 1 + protocol.HEARD_DIGITS
 _VALUE = _WHAT + WHAT_DIGITS
 _ARGUMENTS = WHAT_DIGITS + VALUE_DIGITS
 _LONG_BIT = 3
-"""Bit that distinguishes the code of a command, 9, from that of a request, 5."""
 
 
 class RequestReader(wiring.Component):

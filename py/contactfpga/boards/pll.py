@@ -15,7 +15,6 @@ from fractions import Fraction
 from contactfpga.skin import SkinError
 
 Dividers = Mapping[str, int]
-"""Parameters of the PLL cell."""
 
 MHZ = 1_000_000
 

@@ -24,7 +24,6 @@ UNIT_PORTS = ("spi_ready_n", "spi_pace", "spi_clock", "spi_select_n", "spi_mosi"
 
 
 def unit_ports(skin: Skin) -> tuple[str, ...]:
-    """Ports of a Skin's converter; none without units."""
     if not skin.units:
         return ()
     return UNIT_PORTS if skin.derived.units.converter.pace is not None else UNIT_PORTS[2:]
@@ -40,7 +39,6 @@ class Bridge:
 
     chip: str
     usb: tuple[int, int]
-    """Vendor and product ID."""
     interface: int | None
     """Interface of the UART; None for a chip with one interface."""
     max_baud: int
@@ -66,8 +64,6 @@ class Bridge:
 
 @dataclasses.dataclass(frozen=True)
 class Programmer:
-    """The program that writes a bitstream into the board's flash."""
-
     tool: str
     options: tuple[str, ...]
     install: str
@@ -100,7 +96,6 @@ class BoardSpec:
     bridge: Bridge
     programmer: Programmer
     bitstream: str
-    """File ending of the bitstream."""
     constraints: str
     """File in constraints/, common to boards with the same pins."""
     skin: Skin
@@ -152,7 +147,6 @@ class BoardSpec:
         return Skin.load(path, usual={"clock_hz": self.skin.clock_hz, "baud": self.skin.baud})
 
     def label(self, pin: str) -> str:
-        """The print on the board beside a pin."""
         connector, _, number = pin.partition(":")
         return f"{self.connectors[connector]} {number}"
 
@@ -218,14 +212,12 @@ class BoardSpec:
 
 
 def row_wires(skin: Skin) -> dict[str, int]:
-    """Bits of each row port, in pin order."""
     if skin.row_drive == "direct":
         return {"rows": skin.row_lines}
     return {"row_clock": 1, "row_latch": 1, "row_enable_n": 1, "row_data": skin.row_chains}
 
 
 def column_wires(skin: Skin) -> dict[str, int]:
-    """Bits of each column port, in pin order."""
     if skin.column_read == "direct":
         return {"columns": skin.column_lines}
     return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}

@@ -69,8 +69,6 @@ class Wire:
 
 @dataclasses.dataclass(frozen=True)
 class Output:
-    """An output of a 74HC595, or an input of a 74HC165."""
-
     chip: str
     chain: int
     number: int
@@ -104,7 +102,6 @@ def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
 
 
 def outputs(skin: Skin) -> list[Output]:
-    """All used outputs of the shift registers, rows first."""
     found: list[Output] = []
     if skin.row_drive != "direct":
         found += _chained("74HC595", ROW_OUTPUTS, skin.row_chains, row_lines(skin))

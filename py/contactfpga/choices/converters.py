@@ -34,11 +34,9 @@ class Converter(Choice):
     bits: int
     """Bits of a reading, at most 28."""
     channels: int
-    """Largest number of units."""
     limits: tuple[tuple[float, int], ...]
     """(supply in V, highest SPI clock in Hz) from the data sheet, rising; the first is the lowest supply."""
     most_v: float
-    """Highest supply in V."""
     least_level_ns: int
     """Shortest level, high or low, of the SPI clock."""
     sweep_levels: int
@@ -46,7 +44,6 @@ class Converter(Choice):
     spacing_levels: int
     """Levels of the SPI clock between the samples of two units; 0 for simultaneous samples."""
     pace: ConverterPace | None = None
-    """Pacing clock; None for a converter that converts on request."""
 
     def most_hz(self, supply_v: float) -> int:
         """Highest SPI clock in Hz; between two supplies of the data sheet that of the lower one."""

@@ -12,7 +12,6 @@ class Report:
     title: str
     kind: int
     code: int
-    """Code in a hello."""
     zones: bool
     """Whether the board finds zones; otherwise it sends a bitmap."""
     divided: bool

@@ -30,7 +30,6 @@ class Scan(Choice):
     """Whether the scan waits until the next stage takes a row, and begins a frame only when the last is packed, so that
     no stage is too slow. With zones it passes on only driven rows, with their numbers."""
     guards: bool = False
-    """Whether the scan checks the lines of a Skin with ``guard``, and has the port ``faults``."""
     moves_sample: bool = False
     """Whether the scan obeys the command "sample at", by the ports of
     :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
@@ -85,7 +84,6 @@ def _raster_min_row_clocks(derived: Any) -> int:
 
 
 def _adaptive_min_row_clocks(derived: Any) -> int:
-    """Clocks to pass on a slot's rows before the next strobe, and to pack a frame before the next one ends."""
     rows = derived.skin.rows
     handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
     least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))

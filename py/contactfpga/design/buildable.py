@@ -61,7 +61,6 @@ def proposed(board: BoardSpec, skin: Skin, circuit: Circuit | None) -> dict[str,
 
 
 def _wirings(skin: Skin) -> Iterator[dict[str, Any]]:
-    """Ways to need fewer pins; driven columns need direct ones."""
     rows: dict[str, Any] = {"row_drive": "74hc595"}
     columns: dict[str, Any] = {"column_read": "74hc165"} | ({"precharge_us": 0.0} if skin.precharge_us else {})
     yield from (rows, columns, rows | columns)

@@ -52,12 +52,10 @@ class Kit:
 
     @functools.cached_property
     def skin(self) -> Skin:
-        """The Skin of the bitstream."""
         return self.board.load(self.skin_path)
 
 
 def names() -> list[str]:
-    """Names of all kits, sorted."""
     return sorted(path.parent.name for path in (examples() / "kits").glob("*/kit.toml"))
 
 

@@ -22,14 +22,11 @@ SIM, REPLAY, NET, FLEXITAC = "sim:", "replay://", "zenoh://", "flexitac://"
 
 
 def searched(port: object) -> bool:
-    """Whether a port has to be searched."""
     return port is None or (isinstance(port, str) and port.startswith((NAME, USB)))
 
 
 @dataclasses.dataclass(frozen=True)
 class Serial:
-    """The device of a serial port."""
-
     device: str
 
 
@@ -44,7 +41,6 @@ class Sim:
     units: str | None = None
     """File of pressure units, pressed by the scene."""
     sheets: str | None = None
-    """File of several sheets on one FPGA, instead of a Skin; the scene touches each."""
 
     @classmethod
     def parse(cls, name: str) -> Sim:
@@ -104,11 +100,9 @@ class Replay:
     start_s: float = 0.0
     """Time in s; an MCAP file plays from the last hello before it."""
     link: str | None = None
-    """Link to play from an MCAP file with several."""
 
     @classmethod
     def parse(cls, name: str) -> Replay:
-        """Decode an address; raises :class:`AddressError`."""
         path, *rest = _REPLAY_OPTIONS.split(name.removeprefix(REPLAY), maxsplit=1)
         found: dict[str, str] = {}
         for part in rest[0].split("&") if rest else ():
@@ -155,7 +149,6 @@ class Net:
 
     @classmethod
     def parse(cls, name: str) -> Net:
-        """Decode an address; raises :class:`AddressError`."""
         head, _, query = name.removeprefix(NET).partition("?")
         found: dict[str, str] = {}
         for part in query.split("&") if query else ():
@@ -203,7 +196,6 @@ class Flexitac:
 
     @classmethod
     def parse(cls, name: str) -> Flexitac:
-        """Decode an address; raises :class:`AddressError`."""
         device, _, query = name.removeprefix(FLEXITAC).partition("?")
         if not device:
             raise AddressError(f"{name}: it names no device; {_FLEXITAC_FORM}")
@@ -277,7 +269,6 @@ def parse(name: str) -> Address:
 
 
 def _no_port(name: str) -> str | None:
-    """Reason why a name cannot be a serial port, or None."""
     if not name:
         return "the port has no name; leave it out to take the board that is plugged in"
     scheme, colon, _ = name.partition("://")

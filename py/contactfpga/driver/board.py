@@ -282,7 +282,6 @@ class _SlotListener:
 
 
 def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
-    """All slots of a new test. Raises :class:`ReadTimeout`, and the errors of a command."""
     deadline = link.clock() + timeout
     while True:
         slots = _listen_for_slots(link)

@@ -176,7 +176,6 @@ def continues(packets: np.ndarray) -> np.ndarray:
 
 
 def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
-    """Differences of successive values, from ``before`` on; ``modulus`` is a power of two."""
     steps = values.copy()
     steps[1:] -= values[:-1]
     steps[0] -= before
@@ -184,9 +183,7 @@ def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
 
 
 MOST_PPM, USUAL_PPM = 200.0, 50.0
-"""Largest and usual difference of the clock rates."""
 WINDOW_S = 60.0
-"""Age beyond which arrivals do not count."""
 PIECE_S = 0.25
 """Length of a piece of the window, in which only the least delayed arrival counts."""
 UNKNOWN_S = 0.02
@@ -198,7 +195,6 @@ QUIET_S = 5.0
 CAUTION = 1.25
 """Factor on the uncertainty, because clocks do not keep to straight lines."""
 MOST_ASKED, MOST_POINTS = 64, 512
-"""Most answered requests and most least-delayed arrivals that count."""
 
 _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 
@@ -206,7 +202,6 @@ _SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
 class _Point(NamedTuple):
     device_s: float
     excess_s: float
-    """Advance of the host's clock over the board's, delays included."""
 
 
 class ClockFit:

@@ -39,8 +39,6 @@ _FRAME_KINDS = set(protocol.KINDS.values())
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Arrival:
-    """A received frame."""
-
     zones: Zones
     answers: int
     """Highest ticket of :meth:`Conversation.ask` that was issued before the frame was scanned."""
@@ -52,7 +50,6 @@ class Steady(NamedTuple):
     time_us: int
     """Time of :attr:`before` since power-up."""
     before: Frame
-    """The last frame."""
     came_s: float
     """Arrival of :attr:`before`, on the host's clock."""
     fit: ClockFit
@@ -312,7 +309,6 @@ class Conversation:
         return Run(widths.sheet, packets, starts, table.records, times_us, line, before, faults, self.units.history)
 
     def _heard(self, heard: int, time_us: int, packet_bytes: int, now: float) -> HostLine | None:
-        """Take the request number of a frame with a known time."""
         answered = self._requests.answered
         self._requests.take_frame(heard, now)
         asked_s = self._requests.answered_sent_s if self._requests.answered > answered else None

@@ -123,7 +123,6 @@ def _opened(
 
 
 _boards: dict[str | None, Board] = {}
-"""Boards that :func:`read_zones` keeps open, by port."""
 _lock = threading.RLock()
 
 
@@ -166,7 +165,6 @@ def _forget(port: str | None, board: Board | None = None) -> None:
 
 
 def _given_back() -> bool:
-    """Close the boards that :func:`read_zones` keeps open; False if there are none."""
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)

@@ -57,7 +57,6 @@ class Lines:
         return None if found == before else found
 
     def names(self, flagged: bool) -> tuple[str, ...]:
-        """Names of the faults of the next frame."""
         if flagged:
             return self._names
         if self.fading:

@@ -47,8 +47,6 @@ SUPPORTED = supported(BOARDS.values())
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """A port that could be a board."""
-
     device: str
     boards: str
     serial_number: str | None = None
@@ -137,7 +135,6 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
 
 
 def survey(candidates: Sequence[Candidate], baud: int) -> list[Reply]:
-    """Listen to all of these ports at once."""
     if not candidates:
         return []
     with ThreadPoolExecutor(len(candidates)) as pool:
@@ -195,7 +192,6 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
 
 
 def _meant(heard: Sequence[Reply], port: str | None, skin: Skin | None) -> list[Reply]:
-    """Boards selected by port name or Skin; among several, those with the Skin's name."""
     found = [one for one in heard if one.hello is not None]
     if port is not None and port.startswith(NAME):
         found = _named(found, port.removeprefix(NAME))

@@ -21,7 +21,6 @@ from contactfpga.wire.protocol import HEARD_DIGITS, KIND_REQUEST, REQUEST_HELLO,
 
 MARK = b"\xaa\x55"
 BITS_PER_BYTE = 10
-"""Bits of a byte on the line, with start and stop."""
 DAMAGED = b"\x01\x00"
 """Packet in place of bytes that are no frame; it counts as damaged."""
 

@@ -23,7 +23,6 @@ _functions: list[Callable[[], None]] = []
 
 
 def watch(owner: Owner) -> None:
-    """Call the object's ``forked`` in every child from now on."""
     _owners.add(owner)
 
 

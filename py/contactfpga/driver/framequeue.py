@@ -55,7 +55,6 @@ class FrameQueue:
             self.dropped += self._drop(self._held - self.maxsize)
 
     def put_back(self, zones: Zones) -> None:
-        """Make this frame the next one."""
         self._unwrap()
         self._items.appendleft(zones)
         self._gone -= 1
@@ -132,7 +131,6 @@ class FrameQueue:
         return self._came - self._gone + self.others
 
     def _drop(self, most: int) -> int:
-        """Drop the first item, or at most ``most`` frames of a run; returns the number of frames."""
         item = self._items[0]
         if not isinstance(item, (Zones, Run)):
             self._items.popleft()

@@ -29,15 +29,12 @@ JITTER_S = 0.03
 
 
 class Finding(NamedTuple):
-    """Result of one check."""
-
     verdict: Literal["ok", "note", "fault"]
     sentence: str
     """The result, with the next step if there is one."""
 
 
 def rights(port: str) -> Iterator[Finding]:
-    """Check whether this user may read and write the port."""
     if sys.platform == "win32":
         return
     if not os.path.exists(port):
@@ -89,7 +86,6 @@ def _advice() -> str:
 
 
 def hello(board: Board) -> Iterator[Finding]:
-    """Describe the board by its hello."""
     sheet = board.sheet
     surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
     surface = f"closed {surface}" if sheet.closed else surface
@@ -103,7 +99,6 @@ def hello(board: Board) -> Iterator[Finding]:
 
 
 def reader(board: Board) -> Iterator[Finding]:
-    """Name the thread that reads the port."""
     if why := native.refusal(board.port):
         yield Finding("note", f"{board.port} is read in Python, not in C: {why}")
     else:
@@ -130,7 +125,6 @@ NEXT_STEPS = {
 
 
 def lines(board: Board, zones: Zones) -> Iterator[Finding]:
-    """Describe the board's line faults, and the age of this report."""
     if zones.arrived_s is not None:
         yield Finding("ok", f"the last frame came {1000 * board.silence.seconds:.0f} ms ago")
     if zones.faults == (STUCK,):

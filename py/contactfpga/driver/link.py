@@ -194,7 +194,6 @@ class Link:
             self.transport.close()
 
     def _in_use(self) -> bool:
-        """Whether a thread is in the transport; the caller holds the lock."""
         return self._reading is not None or self._writing is not None
 
     def _leave(self) -> None:
@@ -247,7 +246,6 @@ class Link:
             self.wait_for(lambda: None, until, seconds)
 
     def _read_once(self, seconds: float) -> int:
-        """Read once, releasing the held lock meanwhile; returns the number of bytes."""
         self._reading = threading.get_ident()
         breaks = self._breaks()
         self.changed.release()
@@ -269,7 +267,6 @@ class Link:
 
     @property
     def net(self) -> NetCounters | None:
-        """The network's counters; None for a port without a network."""
         return counters_of(self.transport)
 
     def _denied(self) -> int:

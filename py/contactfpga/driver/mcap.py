@@ -299,14 +299,10 @@ class Summary:
         self.statistics = counted
 
     def kind(self, channel: Channel) -> str:
-        """The type of a channel's messages."""
         return self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
 
 
 def _each(file: BinaryIO, kind: int, places: list[tuple[int, int]]) -> Iterator[bytes]:
-    """Contents of the records of this kind at these (position, size) places. Raises :class:`Unreadable`, also for a
-    repeated place.
-    """
     free = 0
     for at, size in sorted(places):
         if not free <= at <= at + size <= _file_bytes(file):
@@ -324,7 +320,6 @@ def _file_bytes(file: BinaryIO) -> int:
 
 
 def data_of(message: bytes) -> bytes:
-    """Content of a message of :data:`KIND`."""
     _, _, name = _BEGIN.unpack_from(message)
     at = -(-(_BEGIN.size + name) // 4) * 4
     (count,) = _COUNT.unpack_from(message, at)
@@ -366,7 +361,6 @@ class McapBytes:
         raise RecordingError(f"{self.path} has no link {link!r}; it has {names}")
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """The texts of this name in the metadata, without repetitions in further files."""
         found: list[dict[str, str]] = []
         for part in self._parts:
             found += [one for one in part.texts(name) if one not in found]
@@ -419,7 +413,6 @@ class McapStream:
 
 
 def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
-    """Position of the last whole hello in the joined bytes; -1: there is none."""
     found, before, held = -1, 0, b""
     for _, data in pieces:
         data = held + data

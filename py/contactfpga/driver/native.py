@@ -110,14 +110,12 @@ class Library:
 
 @functools.lru_cache(maxsize=1)
 def library() -> Library:
-    """The loaded library. Raises OSError if it does not exist."""
     found = Library(LIBRARY)
     forks.in_child(found.forked)
     return found
 
 
 def missing() -> str:
-    """Reason why the library is unusable; "" if it is usable."""
     if os.name != "posix":
         return "it needs Linux or macOS"
     if not LIBRARY.exists():

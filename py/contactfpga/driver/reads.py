@@ -70,7 +70,6 @@ class Reads:
         return end
 
     def _next_break(self, at: int) -> int:
-        """The first flagged or late read from here on."""
         if self._reads["odd"][at]:
             return at
         place = bisect.bisect_right(self._breaks, at)

@@ -188,8 +188,6 @@ class ReplayTransport:
 
 
 class _Pace:
-    """Delays the packets of a recording until their time."""
-
     def __init__(self, name: str, factor: float):
         self._name = name
         self._factor = factor

@@ -31,8 +31,6 @@ _DAMAGED = b"\x01\x00"
 
 
 class Sorter:
-    """Sorts packets by sheets."""
-
     def __init__(self) -> None:
         self.alone = False
         """Whether the last hello is of a board with one sheet, without number."""
@@ -79,7 +77,6 @@ class SharedPort:
 
     @property
     def names(self) -> list[str]:
-        """Ports of all sheets known so far."""
         return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
 
     def add(self, sheet: SheetPort) -> None:
@@ -89,7 +86,6 @@ class SharedPort:
             self._waiting[sheet] = deque(maxlen=MOST_WAIT)
 
     def drop(self, sheet: SheetPort) -> bool:
-        """Remove a sheet; returns whether it was the last one."""
         with self._changed:
             return self._waiting.pop(sheet, None) is not None and not self._waiting
 
@@ -127,7 +123,6 @@ class SharedPort:
             raise PortNotFound(f"{sheet.name}: the board at {name} has the sheets 0 to {sheets - 1}")
 
     def _read_once(self, seconds: float) -> bool:
-        """Read once, releasing the held lock meanwhile; returns whether bytes came."""
         self._reading = True
         self._changed.release()
         data, failure = b"", None

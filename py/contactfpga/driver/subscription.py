@@ -38,7 +38,6 @@ class Listening(Generic[Item]):
 
     @property
     def maxsize(self) -> int:
-        """Most frames that wait."""
         return self._frames.maxsize
 
     @property
@@ -65,7 +64,6 @@ class Listening(Generic[Item]):
         return cast(Item, checked_item(found))
 
     def close(self) -> None:
-        """Take no more."""
         with self._link.changed:
             self._closed = True
             self._link.leave(self._frames)
@@ -107,7 +105,6 @@ class Listening(Generic[Item]):
                 return
 
     async def awaited(self, timeout: float = 1.0) -> Item:
-        """:meth:`next` as a coroutine."""
         import asyncio  # a quarter of what contactfpga.open would load
 
         if self._frames or timeout == 0:
@@ -117,7 +114,6 @@ class Listening(Generic[Item]):
         return self.next(timeout)  # which waits for nothing now, and takes no frame if we were canceled above
 
     def _wait(self, timeout: float) -> None:
-        """Wait for an item, or for a silence to report."""
         timeout = checked(timeout)
         until, silent_at = self._link.clock() + timeout, self._silent_at()
         try:
@@ -127,7 +123,6 @@ class Listening(Generic[Item]):
                 raise
 
     def _silent_at(self) -> float:
-        """Time of the next silence to report."""
         if self._deadline_s is None:
             return float("inf")
         return max(self._noticed, self._link.last_s) + self._deadline_s

@@ -121,7 +121,6 @@ class SerialTransport:
         return int(self._port.fileno())
 
     def lost(self, error: Exception) -> PortLost:
-        """The error for a lost port."""
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
 
 
@@ -133,8 +132,6 @@ def _quieten(library: str) -> None:
 
 
 class Named(Protocol):
-    """An object with a name."""
-
     name: str
 
 
@@ -201,7 +198,6 @@ forks.in_child(_SIMULATED.clear)
 
 
 def counters_of(transport: Transport) -> NetCounters | None:
-    """The counters of the network between host and board; None without a network."""
     return getattr(transport, "counters", None)
 
 

@@ -9,7 +9,6 @@ from numbers import Real
 from typing import Any
 
 MAX_SHOWN = 80
-"""Most characters of a value in a message."""
 MAX_MESSAGE = 4000
 """Most characters of a message; paths have up to 4,096."""
 
@@ -73,7 +72,6 @@ def visible(text: str) -> str:
 
 
 def visible_lines(text: str) -> str:
-    """:func:`visible`, line by line."""
     return "\n".join(map(visible, text.split("\n")))
 
 

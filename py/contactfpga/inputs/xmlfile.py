@@ -34,7 +34,6 @@ class _Elements(ElementTree.TreeBuilder):
         self._count = 0
 
     def doctype(self, *_: object) -> None:
-        """Refuse a document type before its declarations are read."""
         raise _Doctype
 
     def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:

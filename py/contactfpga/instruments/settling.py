@@ -42,7 +42,6 @@ class _Search:
         return np.asarray((self.enough + self.too_few) // 2)
 
     def vote(self, clocks: int, counts: np.ndarray, enough: np.ndarray) -> None:
-        """Add a frame sampled at ``clocks``; ``enough``: whether that sufficed, at the places where it ``counts``."""
         asked = counts & self.open & (self.middle == clocks)
         self._votes += np.array([asked & ~enough, asked & enough])
         no, yes = self._votes >= AGREE

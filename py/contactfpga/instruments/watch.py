@@ -17,7 +17,6 @@ from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zones
 
 Cell = tuple[int, int]
-"""(row, column)"""
 
 FEW_CELLS = 3
 """Most cells in an unchanging group of stuck switches; a larger group is rather an object."""
@@ -82,7 +81,6 @@ def reach_of(area: int) -> int:
 
 
 def places(cells: np.ndarray) -> tuple[Cell, ...]:
-    """The (row, column) of each True of (rows, columns) bool."""
     return tuple((row, column) for row, column in np.argwhere(cells).tolist())
 
 
@@ -200,7 +198,6 @@ class CellHistory:
 
 
 Record = tuple[int, int, int]
-"""Area and sums of a zone, or area and barycenter."""
 
 Key = tuple[int, int, int, str]
 
@@ -256,7 +253,6 @@ class ZoneHistory:
             yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
     def _may_have_joined(self, gone: Key) -> bool:
-        """Whether a vanished zone is near enough to a present one to have merged into it."""
         middles = self._middles(gone)
         for key in self._since_us:
             away = away_from(middles, reach_of(gone[0]) + reach_of(key[0]), self._sheet)
@@ -307,7 +303,6 @@ def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
 
 
 def _keys(zones: Zones) -> set[Key]:
-    """Keys of zones with cells; a ``mismatch`` frame may have zones without."""
     windings = zones.windings or [""] * len(zones)
     return {(area, x, y, winding) for (area, x, y), winding in zip(zones.records.tolist(), windings) if area}
 

@@ -280,7 +280,6 @@ def _within(name: str, value: float, low: float, high: float, unit: str = "") ->
 
 
 _PITCH_TOLERANCE = 1e-3
-"""Allowed relative deviation of a pitch from the radius."""
 
 
 def check_surface(skin: Skin) -> dict[str, float]:
@@ -299,7 +298,6 @@ def check_surface(skin: Skin) -> dict[str, float]:
 
 
 def _check_gap(skin: Skin, around_mm: float) -> dict[str, float]:
-    """Check that the ends of an open sheet do not meet."""
     if skin.columns * skin.pitch_x_mm >= around_mm:
         most = math.ceil(around_mm / skin.pitch_x_mm) - 1
         advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"

@@ -2,7 +2,6 @@
 
 MAX_LINES = 64
 MIN_AROUND = 3
-"""Least columns of a sheet whose ends meet."""
 MAX_NAME_BYTES = 32
 MAX_BAUD_ERROR = 0.015
 MIN_PITCH_MM, MAX_PITCH_MM = 0.01, 1000.0

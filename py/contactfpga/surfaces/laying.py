@@ -141,7 +141,6 @@ class Placement:
         return self._table(points, normals, closed=closed)
 
     def _heights(self, mesh: Triangles) -> Floats:
-        """z of each row, a pitch apart on the mesh along column 0."""
         far = (self.rows - 1) * self.pitch_y_mm
         fine = np.linspace(0, far, FINE * self.rows)
         line, _ = self._seen(mesh, np.zeros(len(fine)), fine)

@@ -128,7 +128,6 @@ def _first() -> str:
 
 
 def _renamed(arguments: Sequence[str]) -> list[str]:
-    """The arguments with the command's current name; reports a renaming."""
     old, *rest = arguments or [""]
     if old not in RENAMED:
         return list(arguments)
@@ -206,7 +205,6 @@ class Parser(argparse.ArgumentParser):
         self._add = add
 
     def complete(self) -> None:
-        """Add the arguments, once."""
         add, self._add = self._add, None
         if add is not None:
             add(self)

@@ -77,7 +77,6 @@ class Tracker:
     # ---- one frame
 
     def _restart(self, zones: Zones) -> bool:
-        """End all contacts if a frame does not continue the last one."""
         if self._sheet is zones.sheet and zones.time_us >= self._time_us:
             return False
         restarted = zones.time_us < self._time_us or self._sheet not in (None, zones.sheet)
@@ -113,7 +112,6 @@ class Tracker:
         return unsure
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:
-        """Spots with their continuing zones, spots not found, and new zones."""
         spots = self._spots
         if not spots or not seen:
             return [], list(spots), list(seen)

@@ -66,7 +66,6 @@ def encode_command(number: int, command: Command, hello: bool = False, pulsed: b
 _MARK, _ONE, _ZERO = 0xF0, 0xFF, 0x00
 """Bytes of :func:`contactfpga.wire.framing.pulses`: a mark, and the bits 1 and 0."""
 _SIZES = {KIND_REQUEST: HEARD_DIGITS + 1, KIND_COMMAND: HEARD_DIGITS + WHAT_DIGITS + VALUE_DIGITS + 1}
-"""Plain bytes of a packet by kind."""
 
 
 class RequestKind(enum.Enum):

@@ -34,7 +34,6 @@ def digits(value: int, count: int) -> bytes:
 
 
 def number(data: bytes) -> int:
-    """Undo :func:`digits`."""
     return sum((byte & 0x7F) << DIGIT_BITS * place for place, byte in enumerate(data))
 
 
@@ -75,7 +74,6 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(data: bytes) -> bytes:
-    """Undo :func:`cobs_encode`; raises :class:`PacketError` if the blocks do not fit the length."""
     out = bytearray()
     position = 0
     while position < len(data):

@@ -114,8 +114,6 @@ def check_prefix(skin: Skin | Hello) -> bytes:
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """One received frame."""
-
     sequence: int
     """Number of frames sent before this one, modulo 256."""
     time_us: int
@@ -243,7 +241,6 @@ def _bitmap(data: bytes, widths: Widths) -> np.ndarray:
 
 
 def _split(word: int, *widths: int) -> list[int]:
-    """Fields of a word, lowest first, then its remaining bits."""
     fields = []
     for width in widths:
         fields.append(word & (1 << width) - 1)

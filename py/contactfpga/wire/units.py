@@ -65,8 +65,6 @@ class UnitFacts:
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """Readings of all units in turn."""
-
     time_us: int
     """Device time of the first unit's sample, modulo 2^24 us."""
     sequence: int

@@ -99,5 +99,4 @@ def _spread(share: float, change: float, gap_us: float) -> float:
 
 
 def only(lows: Sequence[int], highs: Sequence[int], value: int) -> list[int]:
-    """Units that only ever read ``value``."""
     return [unit for unit, (low, high) in enumerate(zip(lows, highs, strict=True)) if low == high == value]

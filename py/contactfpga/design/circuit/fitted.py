@@ -62,10 +62,7 @@ class FittedValue:
 
 @dataclasses.dataclass(frozen=True)
 class FittedCircuit:
-    """A fitted circuit and its intervals."""
-
     circuit: Circuit
-    """The given circuit with the fitted values."""
     values: tuple[FittedValue, ...]
     rows: int
     columns: int

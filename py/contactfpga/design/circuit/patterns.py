@@ -31,7 +31,6 @@ def named(rows: int, columns: int) -> Mapping[str, np.ndarray]:
 
 
 def middle(count: int) -> int:
-    """The line in the middle."""
     return count // 2
 
 

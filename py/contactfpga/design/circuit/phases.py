@@ -69,8 +69,6 @@ class Phase:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PhaseResult:
-    """Result of the last drive of a phase."""
-
     phase: Phase
     trace: transient.Waveform
 

@@ -17,7 +17,6 @@ from contactfpga.skin import Skin
 NOISE_V = 0.3
 """Required distance of a level from VIL or VIH."""
 LARGEST_OHM = 1e7
-"""Largest recommended pull."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +35,6 @@ class Worst:
     """Levels of the real sheet and pin currents, at rest."""
 
     level_v: float
-    """Level of the line that is read."""
     margin_v: float
     """Distance from VIL or VIH; negative on the wrong side."""
     pin_ma: float

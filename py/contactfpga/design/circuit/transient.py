@@ -96,7 +96,6 @@ class _DriveEquations:
     def solved(
         self, guess: CircuitState, share: float, lines: np.ndarray, cells: np.ndarray
     ) -> tuple[CircuitState, _Rates] | None:
-        """State with this ``charge + share * current``; None if Newton's method does not converge."""
         for _ in range(ROUNDS):
             rates = self.rates(guess)
             step = self.correction(
@@ -118,7 +117,6 @@ class _DriveEquations:
 
 
 def at_rest(network: Network, drive: Drive) -> CircuitState:
-    """The stationary state."""
     equations = _DriveEquations(network, drive)
     start = network.unpressed()
     rates = equations.rates(start)

@@ -56,9 +56,7 @@ class Force:
     """A force from which touches are felt."""
 
     value_n: float
-    """Median over drawn sheets."""
     low_n: float
-    """Minimum over drawn sheets."""
     high_n: float
     """Maximum over drawn sheets; 95 % of all sheets lie between."""
 

@@ -22,8 +22,6 @@ BELOW_MM = 0.3
 
 @dataclasses.dataclass(frozen=True)
 class Caps:
-    """The cap layer of a sheet; lengths are in mm."""
-
     centers: np.ndarray
     """(caps, 2): x and y of each cap, y down."""
     side_mm: float
@@ -41,7 +39,6 @@ class Caps:
         return np.asarray(one[None] + moved[:, None, None]).reshape(-1, 3, 3)
 
     def stl(self) -> bytes:
-        """The caps as a binary STL file in millimeters."""
         corners = self.triangles()
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.linalg.norm(normals, axis=1)[:, None]

@@ -63,7 +63,6 @@ def levels(pins: Iterable[Pin]) -> dict[str, int]:
 
 
 def height(pins: Iterable[Pin]) -> float:
-    """Height in mm of the channel for these pins."""
     found = levels(pins)
     return LEVEL_MM * (max((level + (net in POWERED) for net, level in found.items()), default=0) + 2)
 

@@ -24,7 +24,6 @@ sys.exit(0 if pcbnew.WriteDRCReport(board, sys.argv[2], pcbnew.EDA_UNITS_MILLIME
 
 
 def there() -> bool:
-    """Whether KiCad is available."""
     try:
         return subprocess.run([PYTHON, "-c", "import pcbnew"], capture_output=True, timeout=60).returncode == 0
     except OSError:

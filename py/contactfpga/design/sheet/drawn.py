@@ -39,10 +39,7 @@ def rounded(value: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class PlacedPart:
-    """A part on the board."""
-
     reference: str
-    """Reference such as ``R7``."""
     part: Part
     value: str
     x: float
@@ -61,7 +58,6 @@ class PlacedPart:
         return rounded(self.x + x * c + y * s), rounded(self.y - x * s + y * c)
 
     def size(self, pad: Pad) -> tuple[float, float]:
-        """Width and height of a pad on the board."""
         return (pad.height, pad.width) if self.turn % 180 else (pad.width, pad.height)
 
 
@@ -79,7 +75,6 @@ class CopperTrack:
 
     @property
     def length(self) -> float:
-        """Length in mm."""
         return math.hypot(self.x2 - self.x1, self.y2 - self.y1)
 
 
@@ -94,8 +89,6 @@ class Via:
 
 @dataclasses.dataclass(frozen=True)
 class Stroke:
-    """A printed line."""
-
     x1: float
     y1: float
     x2: float
@@ -105,8 +98,6 @@ class Stroke:
 
 @dataclasses.dataclass(frozen=True)
 class Hole:
-    """A hole without copper."""
-
     x: float
     y: float
     drill: float
@@ -151,11 +142,9 @@ class Drawing:
                 self.tracks.append(CopperTrack(*a, *b, layer, net, width))
 
     def via(self, net: str, x: float, y: float) -> None:
-        """Add a via."""
         self.vias.append(Via(rounded(x), rounded(y), net))
 
     def stroke(self, x1: float, y1: float, x2: float, y2: float, layer: Layer = "F") -> None:
-        """Print a line."""
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
     def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
@@ -173,7 +162,6 @@ class Drawing:
                 self.stroke(x + u1, y + v1, x + u2, y + v2)
 
     def nets(self) -> list[str]:
-        """Names of all nets, sorted."""
         found = {net for one in self.placed for net in one.nets.values()}
         return sorted(found | {track.net for track in self.tracks} | {via.net for via in self.vias})
 
@@ -186,4 +174,3 @@ _SEGMENTS = {
         strict=True,
     )
 }
-"""Ends of the lit segments of each digit: corners 0 and 1 at the top, 2 and 3 in the middle, 4 and 5 below."""

@@ -95,7 +95,6 @@ def over_pf(width: float, height: float, eps: float) -> float:
 
 
 def across_pf(width: float, other: float, height: float, eps: float) -> float:
-    """Capacitance in pF of two crossing tracks."""
     plates = [over_pf(one, height, eps) * height / (EPS0_PF_MM * eps) for one in (width, other)]
     return EPS0_PF_MM * eps * plates[0] * plates[1] / height
 

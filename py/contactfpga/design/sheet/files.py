@@ -49,7 +49,6 @@ def _table(rows: Iterable[Iterable[object]]) -> str:
 
 
 def parts_list(layout: Layout) -> str:
-    """The parts list as CSV, a line for each kind of part."""
     kinds: dict[tuple[str, str, str], list[str]] = collections.defaultdict(list)
     for one in layout.drawing.placed:
         kinds[one.value, one.part.name, one.part.order].append(one.reference)
@@ -84,7 +83,6 @@ def connectors_list(layout: Layout) -> str:
 
 
 def circuit_table(circuit: Circuit) -> str:
-    """The table ``[circuit]`` of a Skin's file."""
     values = dataclasses.asdict(circuit)
     diode = values.pop("diode")
     lines = ["[circuit]", *(f"{name} = {value!r}" for name, value in values.items())]

@@ -25,7 +25,6 @@ EDGE_LINE_MM = 0.1
 
 
 def files(drawing: Drawing, name: str) -> dict[str, str]:
-    """The text of each file by its name."""
     found = {}
     for layer, said in NAMES.items():
         number = f"L{1 if layer == 'F' else 2}"
@@ -44,7 +43,6 @@ def files(drawing: Drawing, name: str) -> dict[str, str]:
 
 
 def on_layer(pad: Pad, one: PlacedPart, layer: Layer) -> bool:
-    """Whether a pad has copper on this layer."""
     return bool(pad.drill) or one.back == (layer == "B")
 
 
@@ -91,7 +89,6 @@ class _Plot:
         return self.text()
 
     def pads(self, drawing: Drawing, layer: Layer, grown: float, pasted: bool = False) -> str:
-        """Openings of the mask, each pad enlarged by ``grown`` mm, or of the stencil."""
         for one in drawing.placed:
             for pad in one.part.pads:
                 if on_layer(pad, one, layer) and (one.part.pasted or not pasted):
@@ -107,7 +104,6 @@ class _Plot:
         return self.text()
 
     def edge(self, drawing: Drawing) -> str:
-        """The outline; the board ends at the middle of its line."""
         left, top, right, bottom = drawing.outline
         corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
         for a, b in itertools.pairwise(corners):

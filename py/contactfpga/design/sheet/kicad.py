@@ -25,7 +25,6 @@ from contactfpga.design.sheet.drawn import (
 )
 
 SPACE = uuid.UUID("6f3b7d5e-8f0c-5b0e-9b2a-2f6f6a2d7c11")
-"""Namespace of the items' UUIDs."""
 PAGE_MM = 30.0
 
 _LAYERS = (
@@ -163,7 +162,6 @@ class _Writer:
 
 
 def board(drawing: Drawing, title: str, thickness_mm: float = 1.6) -> str:
-    """The text of the .kicad_pcb file."""
     return "\n".join(_Writer(drawing, title, thickness_mm).board()) + "\n"
 
 

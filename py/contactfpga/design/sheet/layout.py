@@ -101,7 +101,6 @@ class _Matrix:
         self.risers = self._risers()
 
     def row_y(self, row: int) -> float:
-        """y of a row's cells; the guard row is the last."""
         return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _GUARD_ROW_Y
 
     def row_net(self, row: int) -> str:

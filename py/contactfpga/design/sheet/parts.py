@@ -56,7 +56,6 @@ class SwitchPart:
 
     part: Part
     force_n: float
-    """Closing force."""
     travel_mm: float
     height_mm: float
     closed_by: float
@@ -133,7 +132,6 @@ SWITCHES = {"dome": DOME, "tact": TACT}
 
 
 def find_switch(name: str) -> SwitchPart:
-    """The switch of this name. Raises :class:`SheetError` for an unknown name."""
     if name not in SWITCHES:
         raise SheetError(f"part is {shown(name)}; it must be one of {', '.join(SWITCHES)}")
     return SWITCHES[name]
@@ -179,5 +177,4 @@ def header(pins: int) -> Part:
 
 
 def smallest_header(pins: int, sizes: Iterable[int] = HEADER_PINS) -> int:
-    """Pins of the smallest header with at least this many."""
     return min(size for size in sizes if size >= pins)

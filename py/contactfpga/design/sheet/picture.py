@@ -65,7 +65,6 @@ def _holes(drawing: Drawing) -> Iterator[tuple[float, float, float]]:
 
 
 def _dots(dots: Iterable[tuple[float, float, float]], color: str) -> Iterator[str]:
-    """Disks, as lines of no length with round ends."""
     places = collections.defaultdict(list)
     for diameter, x, y in dots:
         places[diameter].append(f"M{x:.2f} {y:.2f}h0")

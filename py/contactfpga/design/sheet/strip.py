@@ -37,9 +37,7 @@ class Line:
     """Net beyond the series resistor, named as the gateware's port."""
     x: float
     kind: str
-    """``row`` or ``column``."""
     pull: str
-    """``up``, ``down`` or empty."""
     used: bool = True
     """Whether the line has copper, hence items, in the matrix."""
 
@@ -106,7 +104,6 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
 
 
 def _stepped(drawing: Drawing, net: str, x: float, y: float, grid: Grid) -> Pin:
-    """A pin of the channel, moved onto the grid."""
     step = grid.near(x, below=True)
     drawing.run(net, "B", (x, y), (x, y - 0.9), (step, y - 0.9))
     return Pin(net, step, y - 0.9)
@@ -122,7 +119,6 @@ def _placed(drawing: Drawing, unit: _Unit, y: float) -> list[Pin]:
 
 
 def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
-    """Draw a connector; the tracks of its upper pins go down between the lower ones."""
     for pin in unit.place(drawing, y):
         if pin.y > y:
             yield pin
@@ -132,7 +128,6 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
 
 
 def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    """Connectors for rows and columns; ``below`` puts them on the grid of pins below."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -182,7 +177,6 @@ def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
 
 
 def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
-    """Each shift register with the net of each pin (docs/boards.md)."""
     numbers: dict[str, int] = {}
     chips: dict[tuple[str, int, int], dict[str, str]] = {}
     for output in wiring.outputs(skin):

@@ -303,8 +303,6 @@ class SnapshotQueue:
 
 
 class _Changes:
-    """Changes of an open body, for waiting threads."""
-
     def __init__(self) -> None:
         self.condition = threading.Condition()
         self.closed = threading.Event()  # beside the condition: no change of a link wakes the other links' threads

@@ -63,8 +63,6 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint between two links."""
-
     name: str
     kind: str
     """One of :data:`MOVING`, or ``fixed``."""
@@ -80,8 +78,6 @@ class Joint:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Robot:
-    """The frames of a URDF."""
-
     name: str
     links: tuple[str, ...]
     joints: dict[str, Joint]
@@ -129,7 +125,6 @@ class Kinematics:
         return found
 
     def needed(self, link: str) -> tuple[str, ...]:
-        """The joints that determine the pose of this link."""
         names = (self._follows[joint.name][0] for joint in self._chains[link] if joint.kind in MOVING)
         return tuple(dict.fromkeys(names))
 

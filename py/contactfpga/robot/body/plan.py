@@ -39,14 +39,11 @@ SILENT_S = 0.5
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """One link of a body."""
-
     name: str
     frame: str
     """Name of the link's frame, in the URDF and in contacts."""
     skin: Skin
     port: str | None
-    """Address of the port; None: the board is found by its Skin."""
     pose: Pose
     """Pose of the surface's frame in the link's."""
     mirrored: bool
@@ -77,7 +74,6 @@ class Plan:
 
     @property
     def virtual(self) -> bool:
-        """Whether the board runs in simulated time."""
         return self.port is not None and self.port.startswith("sim:")
 
     @property

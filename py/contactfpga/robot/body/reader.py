@@ -97,7 +97,6 @@ class SharedClock:
             self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
 
     def leave(self, link: str) -> None:
-        """Remove a board, so that nobody waits for it."""
         with self._lock:
             self._joined_s.pop(link, None)
             self._now_s.pop(link, None)
@@ -131,9 +130,7 @@ class LinkMemory:
     came_s: float = -math.inf
     """Scan time of the newest frame ever on its board's clock."""
     down: str = "lost"
-    """Status without a board."""
     reason: str = "it was not tried yet"
-    """Reason for this status."""
 
     def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
         """State at a moment; ``board_s`` is the moment on a virtual board's clock, None for others."""
@@ -153,7 +150,6 @@ class LinkMemory:
 
 
 Observation = tuple[LinkMemory, float | None]
-"""Memory of a link, and a virtual board's clock at that time."""
 
 
 class States(Mapping[str, LinkState]):
@@ -179,8 +175,6 @@ WAIT_S = 0.1
 
 
 class OpenBoard(Protocol):
-    """The part of :class:`contactfpga.Board` that a link needs."""
-
     def latest(self, timeout: float = 1.0) -> Zones:
         """The newest frame."""
 
@@ -307,7 +301,6 @@ class LinkReader:
 
     @property
     def stats(self) -> Stats:
-        """Counters of its boards, including earlier ones."""
         with self._lock:
             return self._total()
 
@@ -329,13 +322,11 @@ class LinkReader:
         self._drop("lost", BoardClosed("the body was closed"))
 
     def observe(self) -> Observation:
-        """The current memory, for :class:`States`."""
         if self._shared_clock is None:
             return self._known, None
         with self._lock:  # a board that is open stays so meanwhile
             return self._known, None if self._board is None else self._board.clock()
 
     def state(self) -> LinkState:
-        """The current state."""
         known, board_s = self.observe()
         return known.state(self.plan, self._clock(), board_s)

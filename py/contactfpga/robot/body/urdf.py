@@ -43,7 +43,6 @@ def located(urdf: str, folder: Path) -> Path:
 
 
 def load(path: Path) -> Robot:
-    """Read a URDF file. Raises :class:`BodyError`, OSError."""
     root = tree(path)
     try:
         return _robot(root)
@@ -52,7 +51,6 @@ def load(path: Path) -> Robot:
 
 
 def tree(path: Path) -> ElementTree.Element:
-    """The root element of a URDF file. Raises :class:`BodyError`, OSError."""
     data = read_small(path, MAX_BYTES, "a URDF file", BodyError)
     return xmlfile.parse(data, path, "a URDF file", BodyError)
 

@@ -127,7 +127,6 @@ class Fit:
 
     @property
     def contacts(self) -> int:
-        """Number of contacts."""
         return len(self.firsts)
 
     @property

@@ -177,7 +177,6 @@ class ClosingWatch:
         return fits[0][1] if alone else [], []
 
     def _beside(self, zones: Zones) -> list[Cell]:
-        """Open switches around the contact, or at its barycenter if none was known."""
         rows, columns = zones.sheet.rows, zones.sheet.columns
         area, x, y = (int(number) for number in zones.records.sum(axis=0))
         known = list(self._pushes) or [(round(y / area), round(x / area))]

@@ -317,9 +317,7 @@ class _Line:
     along: Vector
     normal: Vector
     push: float = 0.0
-    """Push without squeeze."""
     more: float = 0.0
-    """Push per newton of squeeze."""
 
     def __post_init__(self) -> None:
         self.push, self.more = -dot(self.normal, self.start), -dot(self.normal, self.along)
@@ -338,7 +336,6 @@ class _Line:
         return max(0.0, least), None if largest == math.inf else max(0.0, largest)
 
     def pushing(self) -> Range | None:
-        """Squeezes without pull."""
         if abs(self.more) <= ROUNDING:
             return (-math.inf, math.inf) if self.push >= 0 else None
         start = -self.push / self.more

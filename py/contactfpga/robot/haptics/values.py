@@ -91,19 +91,16 @@ def _is_list(value: Any) -> bool:
 
 
 def dot(first: Sequence[float], second: Sequence[float]) -> float:
-    """The inner product."""
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def cross(first: Sequence[float], second: Sequence[float]) -> Vector:
-    """The vector product."""
     ax, ay, az = first
     bx, by, bz = second
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def minus(vector: Vector) -> Vector:
-    """The opposite vector."""
     return -vector[0], -vector[1], -vector[2]
 
 

@@ -45,7 +45,6 @@ class Noise:
 
     @functools.cached_property
     def _spectrum(self) -> tuple[Floats, Floats, Floats]:
-        """Eigenvalues and vectors of the correlations, and inverse standard deviations."""
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(size > 1e-9 * size.max(), size, 0.0)
         over = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)

@@ -24,8 +24,6 @@ QUIET_S = 2 * BEAT_S
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Message:
-    """A message of a publisher."""
-
     publisher: int
     """Random number, drawn at each start of a publisher."""
     sequence: int
@@ -39,13 +37,11 @@ class Message:
     data: bytes
 
     def encode(self) -> bytes:
-        """The payload."""
         fields = (self.publisher, self.sequence, self.offset, self.read_us, self.denied)
         return _HEAD.pack(_MAGIC, *fields) + self.data
 
     @classmethod
     def decode(cls, payload: bytes) -> Message | None:
-        """A message; None for an invalid payload."""
         if not HEAD_BYTES <= len(payload) <= HEAD_BYTES + MOST_BYTES or not payload.startswith(_MAGIC):
             return None
         _, publisher, sequence, offset, read_us, denied = _HEAD.unpack_from(payload)

@@ -105,12 +105,10 @@ class ZenohPort:
         return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:
-        """Send a request to the board."""
         assert self._asks is not None
         self._asks.put(data)
 
     def clock(self) -> float:
-        """This machine's clock."""
         return time.monotonic()
 
     def close(self) -> None:

@@ -26,8 +26,6 @@ SIMULATED_S = 0.002
 
 
 class BoardPort(Protocol):
-    """A transport of the driver."""
-
     threaded: bool
 
     def read(self, timeout_s: float) -> bytes: ...
@@ -82,7 +80,6 @@ class BoardPublisher:
             self._out.undeclare()
 
     def step(self) -> None:
-        """Send the next bytes."""
         data = self._read(BEAT_S)
         read_us = round(self._clock() * 1e6)
         if data and self._batch_s:

@@ -98,7 +98,6 @@ def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.S
 
 
 def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, what: str) -> zenoh.Session:
-    """Open a session; a file overrides the settings, an explicit endpoint the file."""
     try:
         import zenoh
     except ModuleNotFoundError as error:
@@ -141,7 +140,6 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
 
 
 def _check_files(found: zenoh.Config, config: str) -> None:
-    """Check files that Zenoh would report as a missing connection."""
     for name in FILES:
         path = json.loads(found.get_json(name))
         if path is not None and not Path(path).is_file():

@@ -64,7 +64,6 @@ def _put_numbers(letters: str, paths: tuple[_Path, ...], out: bytearray, message
 
 @functools.cache
 def _aligned(letters: str, offset: int) -> struct.Struct:
-    """Numbers after ``offset`` bytes, each aligned to its own size."""
     form = "<"
     for letter in letters:
         size = struct.calcsize("<" + letter)

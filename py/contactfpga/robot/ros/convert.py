@@ -74,7 +74,6 @@ def skin(hello: Hello, head: Message) -> Message:
 
 
 def zone(found: Zone) -> Message:
-    """A ``Zone``."""
     return {
         "position": vector(_NOWHERE) if found.point_mm is None else _point(found.point_mm),
         "normal": vector(found.normal or _NOWHERE),
@@ -191,7 +190,6 @@ def _point(point_mm: tuple[float, float, float]) -> Message:
 
 
 def vector(values: Sequence[float]) -> Message:
-    """A ``geometry_msgs/Vector3`` or ``Point``."""
     x, y, z = values
     return {"x": x, "y": y, "z": z}
 

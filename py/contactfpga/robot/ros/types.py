@@ -88,8 +88,6 @@ def messages() -> Path:
 
 @dataclasses.dataclass(frozen=True)
 class MessageField:
-    """A field of a message."""
-
     name: str
     type: str
     """A key of :data:`PRIMITIVES`, ``string``, or the name of a message: ``std_msgs/Header``."""
@@ -98,14 +96,11 @@ class MessageField:
 
     @property
     def nested(self) -> bool:
-        """Whether the field holds messages."""
         return "/" in self.type
 
 
 @dataclasses.dataclass(frozen=True)
 class MessageType:
-    """A message type."""
-
     name: str
     """Package and type: ``contactfpga_msgs/Zones``."""
     fields: tuple[MessageField, ...]
@@ -113,7 +108,6 @@ class MessageType:
     text: str
 
     def constant(self, name: str) -> int:
-        """A constant by its name in the text."""
         return dict(self.constants)[name]
 
 

@@ -60,7 +60,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> Circuit | None:
-    """The circuit of the Skin's file, or of the board's own Skin. Raises CircuitError if its times do not suffice."""
     if isinstance(design, Several):
         return None
     circuit = load_checked(args.skin, design) if args.skin else Circuit(**board.circuit)
@@ -73,7 +72,6 @@ def _circuit(args: argparse.Namespace, board: BoardSpec, design: Skin | Several)
 
 
 def _check(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -> int:
-    """Print what fits, what does not, and fitting values."""
     from contactfpga_hdl.board import build
 
     if isinstance(design, Several):
@@ -199,7 +197,6 @@ class WiringTable:
 
     @property
     def _sheets(self) -> list[tuple[str, Skin]]:
-        """Each Skin with its sheet's number; "" for a single one."""
         if isinstance(self.skin, Several):
             return [(str(number), skin) for number, skin in enumerate(self.skin.skins)]
         return [("", self.skin)]

@@ -53,7 +53,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; returns 1 if a fault was found."""
     if args.list:
         return _list(args)
     if args.watch and args.self_test:
@@ -75,7 +74,6 @@ class _Report:
     def __init__(self, silent: bool):
         self.stats: Stats | None = None
         self.lines: list[str] | None = None
-        """Last reported line faults; None: the board reports none."""
         self._silent = silent
         self._findings: list[Finding] = []
 
@@ -107,7 +105,6 @@ def _line(finding: Finding) -> str:
 
 
 def _list(args: argparse.Namespace) -> int:
-    """List all boards; returns 1 without any."""
     skin = Skin.load(args.skin) if args.skin else None
     heard = finding.survey(finding.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
     boards = [one for one in heard if one.hello is not None]
@@ -162,7 +159,6 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
 
 
 def _watch(args: argparse.Namespace) -> int:
-    """Watch for ``args.seconds`` or until Ctrl-C; returns 1 if a switch is stuck, loose or never pressed."""
     with flags.opened(args) as board:
         skin = flags.known_skin(board)
         watch = Watch(skin, stuck_s=args.stuck_s or STUCK_S)
@@ -198,7 +194,6 @@ def _watch(args: argparse.Namespace) -> int:
 
 
 def suspected(suspicion: Suspicion) -> Finding:
-    """The finding of a watch."""
     return Finding("fault" if suspicion.kind in FAULTS else "note", suspicion.sentence)
 
 
@@ -246,7 +241,6 @@ def _watched(watch: Watch, findings: list[Finding], seconds: float, faults: int)
 
 
 def _self_test(args: argparse.Namespace) -> int:
-    """Test for ``args.seconds`` or until Ctrl-C; returns 1 for joined lines or bridged diodes."""
     with flags.opened(args) as board:
         known: list[LineFinding] = []
         last: list[SelfTest] = []
@@ -297,5 +291,4 @@ def _tests_end(
 
 
 def tested(finding: LineFinding) -> Finding:
-    """The finding of a self-test."""
     return Finding("fault" if finding.kind == "fault" else "note", finding.sentence)

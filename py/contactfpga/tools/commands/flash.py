@@ -44,7 +44,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _file(args: argparse.Namespace, board: BoardSpec) -> Path:
-    """The bitstream, which may be missing for a kit without a released one."""
     if args.kit and not args.file:
         released = kits.kit(args.kit).bitstream
         return released if released.is_file() else bitstream_path(board, default_folder(board, args.kit))

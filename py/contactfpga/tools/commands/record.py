@@ -75,7 +75,6 @@ def _record(args: argparse.Namespace) -> int:
 
 
 def _body(args: argparse.Namespace) -> Body | None:
-    """The robot to record; None: a board."""
     if not names_robot(args.port):
         return None
     from contactfpga.robot.body import Body
@@ -104,7 +103,6 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
-    """Maker of the forces at contacts of a link with pressure units."""
     from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)

@@ -59,7 +59,6 @@ class _Follow:
         self.forces = forces
 
     def frames(self, board: Board) -> FrameSource:
-        """The board's frames up to the requested end; with forces, once their readings are known."""
         frames: FrameSource = board if self.forces is None else WithReadings(board)
         return frames if self._seconds is None else _TimeLimit(frames, self._seconds)
 
@@ -71,8 +70,6 @@ class _Follow:
 
 
 class _TimeLimit:
-    """Frames of this device time in s."""
-
     def __init__(self, frames: FrameSource, seconds: float):
         self._frames, self._left_us = frames, seconds * 1e6
         self._before_us: int | None = None

@@ -195,7 +195,6 @@ def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
 
 
 def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
-    """Barycenters in dots from the upper left corner of cell (0, 0)."""
     sheet = zones.sheet
     middle = (0.5 if scale < SCALES[0] else 0.25) * scale
     found = [
@@ -206,5 +205,4 @@ def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
 
 
 def _placed(zones: Zones) -> list[tuple[float, float, float]]:
-    """x and y in mm and area in mm2 of the zones with a place."""
     return [(zone.x_mm, zone.y_mm, zone.area_mm2) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]

@@ -101,7 +101,6 @@ def seconds(parser: argparse.ArgumentParser) -> None:
 
 
 def forces(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add forces from pressure units; ``what``: their use."""
     units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
     friction = "Friction coefficient of what touches (default: 0.5); needs --units."
@@ -115,7 +114,6 @@ def check_forces(args: argparse.Namespace) -> None:
 
 
 def once(parser: argparse.ArgumentParser) -> None:
-    """Add ``--once`` of commands that follow a board."""
     parser.add_argument("--once", action="store_true", help="Ask for one frame, show it, and exit.")
 
 
@@ -133,7 +131,6 @@ def known_skin(board: Board) -> Skin | None:
 
 
 def workers(parser: argparse.ArgumentParser) -> None:
-    """Add the worker processes of a long computation."""
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
     dask = "Send the work to the Dask cluster with this scheduler."
     parser.add_argument("--dask", metavar="ADDRESS", help=dask)

@@ -34,8 +34,6 @@ SILENT_S = 0.2
 
 @dataclasses.dataclass(frozen=True)
 class Room:
-    """Space for a frame."""
-
     console: Console
     width: int
     height: int | None
@@ -203,7 +201,6 @@ class _Refresh:
         self._due = time.monotonic()
 
     def due(self, zones: Zones) -> bool:
-        """Whether to show this frame; if so, waits for its time."""
         if 0 <= zones.time_us - self._shown_us < REFRESH_US:
             return False
         self._shown_us = zones.time_us

@@ -24,13 +24,10 @@ def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
 
 
 def shortened(text: str) -> str:
-    """The input, cut to fit the screen."""
     return text if len(text) <= 40 else f"{text[:40]}..."
 
 
 def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
-    """The type, or the word `none`."""
-
     def read(text: str) -> float | None:
         if text == "none":
             return None

@@ -18,6 +18,5 @@ def end_at_once(number: int, _: object = None) -> None:
 
 
 def end_all_at_once() -> None:
-    """Make :func:`end_at_once` the handler of all :data:`SIGNALS`."""
     for number in SIGNALS:
         signal.signal(number, end_at_once)

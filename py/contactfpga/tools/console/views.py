@@ -119,7 +119,6 @@ def table(
 
 
 def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
-    """Push of each zone in N, with its 95 % interval."""
     if contacts is None:
         return [()] * len(zones)
     left, found = iter(contacts), []

@@ -39,8 +39,6 @@ BATCH_BYTES = 2048
 
 
 class Buffer:
-    """A tap with a buffer of bytes."""
-
     events: Events
 
     def __init__(self) -> None:
@@ -164,7 +162,6 @@ class LinkRecorder:
         self._drain()
 
     def _take_rest(self, frames: WithReadings | LinkRecorder) -> int:
-        """Read the remaining frames for a while; returns the number left."""
         until, left = time.monotonic() + END_S, 0
         with contextlib.suppress(ReadTimeout):
             self._left = self._events.settle(self._buffer.end_at)
@@ -183,7 +180,6 @@ class LinkRecorder:
         self._link.poll()
 
     def _clock_s(self) -> float:
-        """The current time; for a recording, that of its last frame."""
         now_s = self.board.clock() if self.board.live else self._last_us / 1e6
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         self.seconds = max(self.seconds, now_s - self._begun_s)
@@ -203,14 +199,12 @@ class Mount:
     place: Place
 
     def zone(self, zone: Zone) -> Zone:
-        """The zone with its place in the link's frame."""
         if zone.x_mm is None or zone.y_mm is None:
             return zone
         point_m, normal = self.place(zone.x_mm, zone.y_mm)
         return dataclasses.replace(zone, point_mm=_vector(1e3 * one for one in point_m), normal=_vector(normal))
 
     def tracks(self, tracks: Tracks) -> Tracks:
-        """The tracks with their zones' places in the link's frame."""
         active = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.active)
         events = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.events)
         return dataclasses.replace(tracks, active=active, events=events)

@@ -43,7 +43,6 @@ class WholeFile:
             raise RecordingFailed(f"{path} cannot be written: {reason}", reason) from None
 
     def tell(self) -> int:
-        """Number of bytes so far, including buffered ones."""
         return self._whole + len(self._waiting)
 
     def write(self, data: bytes) -> int:
@@ -112,7 +111,6 @@ class McapFile:
 
     @property
     def seconds(self) -> float:
-        """Time from the first to the last message."""
         return (self._last_ns - self._first_ns) / 1e9
 
     @property
@@ -137,7 +135,6 @@ class McapFile:
         self.flush_old(now_s)
 
     def copy(self, channel: Channel, of: Schema | None, time_ns: int, data: bytes) -> None:
-        """Add a message of another file."""
         self._make_room(data)
         number = self._channels.get(channel.topic)
         if number is None:

@@ -83,7 +83,6 @@ class Recording:
         return f"<Recording {self.path}: {self.duration_s:.1f} s of {', '.join(self.links)}>"
 
     def _repr_html_(self) -> str:
-        """Its links in a notebook, with the last frame of each."""
         sheets = {link: hello.sheet for link, hello in self.links.items()}
         rows = [[link, f"{sheet.rows}x{sheet.columns}", sheet.report] for link, sheet in sheets.items()]
         table = notebook.table(["link", "cells", "report"], rows, f"{self.path.name}: {self.duration_s:.1f} s")

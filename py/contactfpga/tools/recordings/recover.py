@@ -148,7 +148,6 @@ def _definitions(file: BinaryIO) -> list[_Definitions]:
 
 
 def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, bytes]]:
-    """(number of the recording, kind, content) of all whole records."""
     from mcap.opcode import Opcode
 
     number = 0
@@ -180,7 +179,6 @@ def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, byt
 
 
 def _inside(kind: int, data: bytes) -> Iterator[Any]:
-    """The records needed for a copy. Raises :class:`Unreadable`."""
     from mcap.opcode import Opcode
     from mcap.records import Channel, Chunk, Metadata, Schema
 

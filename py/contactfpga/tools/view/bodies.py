@@ -87,7 +87,6 @@ class BodySource:
         return self._open.latest().links
 
     def close(self) -> None:
-        """Release all ports."""
         self._open.close()
 
 
@@ -153,7 +152,6 @@ class RobotView(abc.ABC):
         self._facts = server.gui.add_markdown("")
 
     def step(self) -> None:
-        """Wait for a moment and draw it."""
         time.sleep(max(0.0, STEP_S - (time.monotonic() - self._stepped_s)))
         self._stepped_s = time.monotonic()
         self._rows = self.draw()
@@ -166,7 +164,6 @@ class RobotView(abc.ABC):
         """Draw the next moment; returns all contacts."""
 
     def tell(self) -> None:
-        """Write the panel."""
         self._table.content = contacts.table(self._rows)
         self._facts.content = as_markdown(self.facts())
 
@@ -232,7 +229,6 @@ class BodyView(RobotView):
 
 
 def told(state: LinkState) -> str:
-    """A link's state for the panel."""
     found = 0 if state.zones is None else len(state.zones)
     zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
     return f"{state}{zones}"

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 FOV_RAD = math.radians(32)
 """Vertical field of view."""
 ROOM = 1.04
-"""Scale of the view for a free margin."""
 FIRST = 1.6
 NEAR = 0.02
 """Nearest drawn depth over the distance."""
@@ -25,8 +24,6 @@ NEAR = 0.02
 
 @dataclasses.dataclass(frozen=True)
 class Side:
-    """A viewing direction."""
-
     toward: np.ndarray
     """(3,) from the scene toward the camera."""
     up: np.ndarray

@@ -12,7 +12,6 @@ from contactfpga.tracking.tracks import Track
 from contactfpga.zones.zone import Zone
 
 MOST = 8
-"""Contacts with a full description."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,12 +36,10 @@ class Row:
 
     @property
     def name(self) -> str:
-        """Its link, if several, and its id."""
         return f"{self.link} {'' if self.id is None else f'#{self.id}'}".strip()
 
     @property
     def lines(self) -> tuple[str, str]:
-        """Name and place; further facts."""
         parts = [f"{self.area_mm2:,.0f} mm²"]
         parts += [] if self.age_s is None else [f"{self.age_s:.1f} s"]
         parts += [] if self.force_n is None else [f"{self.force_n:.1f} N"]

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 KEYS: tuple[Any, ...] = ("1", "2", "3", "4")
 
 Caption = Callable[[], tuple[str, Sequence[Row]]]
-"""Title with time, and contacts."""
 
 
 def add(server: viser.ViserServer, cameras: Cameras, caption: Caption) -> None:

@@ -89,7 +89,6 @@ def dented(vertices: np.ndarray, tiles: Tiles, closed: np.ndarray) -> np.ndarray
 
 
 def plate(tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices in mm and faces of a thin plate under all cells and slightly beyond."""
     sheet = tiles.sheet
     beyond = 0.35
     x_mm = np.linspace(-0.5 - beyond, sheet.columns - 0.5 + beyond, 2 * sheet.columns + 1) * sheet.pitch_x_mm

@@ -43,24 +43,19 @@ def add(spec: Any) -> None:
 
 
 class Obstacle:
-    """An obstacle's place, and the mouse's target."""
-
     def __init__(self) -> None:
         self.kind = NOTHING
         self.wanted_m = self.at_m = AWAY_M
 
     def put(self, kind: str, at_m: np.ndarray) -> None:
-        """Place an obstacle of this kind at once."""
         self.kind, self.wanted_m, self.at_m = kind, at_m, at_m
 
     def go_on(self, seconds: float) -> None:
-        """Move toward the mouse's target for this time."""
         way = self.wanted_m - self.at_m
         far, most = float(np.linalg.norm(way)), FASTEST_M_S * seconds
         self.at_m = self.wanted_m if far <= most else self.at_m + way * (most / far)
 
     def place(self, model: Any, data: Any) -> None:
-        """Place it in one copy of the robot."""
         for name in (BALL, HAND):
             number = model.body(f"obstacle {name}").mocapid[0]
             data.mocap_pos[number] = self.at_m if name == self.kind else AWAY_M

@@ -57,7 +57,6 @@ class View:
             self.stage.press_with(hand)
 
     def step(self) -> None:
-        """Wait for a moment and draw it."""
         moment = self._source.poll()
         if moment is not None:
             self._moment = moment
@@ -78,8 +77,6 @@ def own_skin(flat: bool = False) -> Skin:
 
 @dataclasses.dataclass(frozen=True)
 class ServedView:
-    """A view in service."""
-
     web: viser.ViserServer
     guard: Guard
     view: View | RobotView
@@ -91,8 +88,6 @@ class ServedView:
 
 @dataclasses.dataclass(frozen=True)
 class ViewRequest:
-    """The user's request."""
-
     port: str | None = None
     """A port, ``sim://``, a recording; None: a virtual sheet."""
     skin: str | Path | None = None

@@ -43,8 +43,6 @@ MOST_N = 30.0
 
 
 class Panel:
-    """Writes a source's further data."""
-
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None, cameras: Cameras):
         self._source = source
         self._moment: Moment | None = None
@@ -93,8 +91,6 @@ class Panel:
 
 
 class TimelineControls:
-    """Position and speed of a recording."""
-
     def __init__(self, server: viser.ViserServer, player: Playback[Any]):
         self._player = player
         gui = server.gui
@@ -118,7 +114,6 @@ class TimelineControls:
 
 
 def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
-    """Names and values in the panel."""
     rows = [("source", shortened(source.title)), ("sends", paced(source.meter.frames_per_s))]
     if moment is not None:
         rows.append(("pressed", f"{moment.zones.pressed} cells"))
@@ -145,7 +140,6 @@ def shortened(title: str) -> str:
 
 
 def legend(source: Source, virtual: bool) -> str:
-    """Meaning of each color, in HTML and Markdown."""
     rows = [ZONES, WAY]
     cells = source.sheet.report == "cells"
     rows += [REPORTED] if cells else []

@@ -20,7 +20,6 @@ SIDES = 48
 
 
 def rgb(color: str) -> tuple[int, int, int]:
-    """RGB of ``#rrggbb``."""
     value = int(color[1:], 16)
     return value >> 16, value >> 8 & 0xFF, value & 0xFF
 

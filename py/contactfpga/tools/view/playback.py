@@ -86,7 +86,6 @@ class Playback(abc.ABC, Generic[Item]):
             self.position_s = self._next[0]
 
     def _take(self, until_s: float, deadline: float) -> None:
-        """Add items up to that moment, at least one before the deadline."""
         while self._next is not None and self._next[0] <= until_s:
             self.follow(*self._next)
             self._next = next(self._items, None)
@@ -98,8 +97,6 @@ class Playback(abc.ABC, Generic[Item]):
 
 
 class Player(Playback[Zones]):
-    """Plays one board."""
-
     cells: LoadCells | None = None
 
     def __init__(self, recording: BoardRecording, clock: Callable[[], float] = time.monotonic):

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 
 class BoardRecording(Protocol):
-    """A recording of one board."""
-
     title: str
     sheet: Sheet
 
@@ -89,7 +87,6 @@ class Clock:
         self._passed_us = 0
 
     def take(self, time_us: int) -> float:
-        """Seconds of the next frame."""
         if self._before_us is not None:
             self._passed_us += max(0, time_us - self._before_us)
         self._before_us = time_us

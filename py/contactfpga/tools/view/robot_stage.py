@@ -38,8 +38,6 @@ REST = "what is beyond the limit of all meshes"
 
 @dataclasses.dataclass(frozen=True)
 class Visual:
-    """A mesh of a link."""
-
     link: str
     pose: Pose
     path: Path
@@ -149,7 +147,6 @@ class RobotStage:
         return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False)
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Draw all links at these joint angles."""
         kinematics = self._body.kinematics
         if kinematics is None:
             return
@@ -181,7 +178,6 @@ class RobotStage:
         self._root.position = at_m
 
     def show(self, visible: bool = True, link: str | None = None) -> None:
-        """Show or hide all of it, or one link."""
         (self._root if link is None else self._frames[link]).visible = visible
         if link is not None:
             (self._hidden.discard if visible else self._hidden.add)(link)

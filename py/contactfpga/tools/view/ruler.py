@@ -20,8 +20,6 @@ AXIS = 2.5
 
 @dataclasses.dataclass(frozen=True)
 class Mark:
-    """A text beside the sheet."""
-
     text: str
     point: np.ndarray
     """(3,) in m, in the sheet's frame."""
@@ -56,7 +54,6 @@ def ruler(tiles: Tiles, lift_mm: float = 0.5) -> Ruler:
 
 
 def add(server: viser.ViserServer, node: str, tiles: Tiles, lift_mm: float) -> None:
-    """Draw it; a limb hides the far side."""
     drawn, scene = ruler(tiles, lift_mm), server.scene
     scene.add_line_segments(f"{node}/axes", drawn.axes, picture.AXIS, thickness=2.5, thickness_units="screen")
     for number, mark in enumerate(drawn.marks):

@@ -26,8 +26,6 @@ TOKEN_BYTES = 16
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """An answer instead of the page."""
-
     status: int
     text: str
     headers: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -238,6 +236,5 @@ def _forget_tunnel(server: viser.ViserServer) -> None:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End the server without viser's farewell."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()

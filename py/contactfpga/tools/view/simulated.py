@@ -82,20 +82,16 @@ class RobotCopy:
         return float(self.sheets.data.qpos[model.jnt_qposadr[model.actuator_trnid[0, 0]]])
 
     def force_n(self, link: str) -> float:
-        """Total current force on a link."""
         return float(sum(touch.push_n for touch in self.sheets[link].touches))
 
     def told(self, link: str) -> str:
-        """A link's forces for the panel."""
         return f"pressed by {self.force_n(link):.1f} N, most so far {self.most_n[link]:.1f} N"
 
     def states(self) -> dict[str, LinkState]:
-        """States of all links, from the kit's bytes."""
         links: dict[str, LinkState] = self.sheets.snapshot().links
         return links
 
     def poses(self) -> dict[str, Pose]:
-        """Poses of MuJoCo's bodies by name."""
         model, data = self.sheets.model, self.sheets.data
         return {
             solids.named(model, number): Pose(data.xmat[number].reshape(3, 3).copy(), data.xpos[number].copy())
@@ -126,8 +122,6 @@ class Sweep:
 
 
 class SharedLink:
-    """A link of all copies under the mouse."""
-
     by_force = True
 
     def __init__(self) -> None:
@@ -193,7 +187,6 @@ class SimulatedSource:
         return RobotCopy(skin, sheets, None if made is None else made(float(data.ctrl[0])))
 
     def advance(self) -> None:
-        """Advance to the next moment."""
         if self._stale:
             self._restart()
         pace = self.pace
@@ -220,7 +213,6 @@ class SimulatedSource:
         return self.pace.share
 
     def solids(self) -> list[solids.Solid]:
-        """All drawable geoms."""
         return solids.solids_of(self._model, self.body.links)
 
     def close(self) -> None:
@@ -229,7 +221,6 @@ class SimulatedSource:
 
 
 def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
-    """The model, with shapes of sheets whose links have none, and with obstacles."""
     import mujoco
 
     if not Path(path).is_file():

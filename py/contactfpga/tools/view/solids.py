@@ -21,8 +21,6 @@ PLANE_M = 1.0
 
 @dataclasses.dataclass(frozen=True)
 class Solid:
-    """A drawn part of a link."""
-
     link: str
     pose: Pose
     """In the link's frame."""

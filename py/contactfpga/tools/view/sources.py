@@ -85,8 +85,6 @@ WAITING = 65_536
 
 @dataclasses.dataclass(frozen=True)
 class Moment:
-    """Content of a drawing."""
-
     zones: Zones
     tracks: Tracks
     truth: np.ndarray | None = None
@@ -102,8 +100,6 @@ class Moment:
 
 
 class Source(Protocol):
-    """A source of moments."""
-
     title: str
     sheet: Sheet
     meter: Meter
@@ -179,7 +175,6 @@ class BoardSource:
         return came
 
     def frames(self, seconds: float) -> Batch:
-        """All frames that arrive meanwhile. Raises :class:`~contactfpga.ReadTimeout` without any."""
         return self._frames.batch(seconds, seconds)
 
     def told(self) -> list[tuple[str, str]]:
@@ -202,7 +197,6 @@ class BoardSource:
 
 
 def pushes(contacts: Contacts, zones: Zones) -> list[tuple[Zone, float | None]]:
-    """Each zone with a place, with its push."""
     placed = [zone for zone in zones if zone.x_mm is not None]
     return [(zone, contact.normal_n) for zone, contact in zip(placed, contacts)]
 
@@ -212,7 +206,6 @@ AT_REST = 15.0
 
 
 def paced(frames_per_s: float) -> str:
-    """The frame rate in words."""
     if not frames_per_s:
         return "nothing yet"
     if frames_per_s > AT_REST:
@@ -245,7 +238,6 @@ class Meter:
         self._steps: collections.deque[tuple[int, int, float]] = collections.deque(maxlen=int(CHART_S / CHART_STEP_S))
 
     def take(self, batch: Batch, stats: Stats, dropped: int) -> None:
-        """Add frames, and the port's counters after them."""
         self.stats, self.dropped = stats, dropped
         times_us = batch.frames["time_us"]
         if self._times_us and times_us[0] < self._times_us[-1][0]:  # it started again
@@ -285,7 +277,6 @@ class Meter:
 
     @property
     def frames_per_s(self) -> float:
-        """Frame rate over the last second."""
         if len(self._times_us) < 2:
             return 0.0
         passed_us = self._times_us[-1][0] - self._times_us[0][0]

@@ -29,8 +29,6 @@ FACES = np.array(
 
 
 class Stage:
-    """Draws moments of one sheet."""
-
     def __init__(
         self,
         server: viser.ViserServer,
@@ -81,7 +79,6 @@ class Stage:
 
     @property
     def points_m(self) -> np.ndarray:
-        """(n, 3) points to keep in view."""
         tiles = self.tiles
         if self.limb is not None:
             return self.limb.points_mm * MM
@@ -187,8 +184,6 @@ class Stage:
         return self.tiles.met((np.array(origin_m) - self.point_m) @ self.rotation / MM, direction @ self.rotation)
 
     def press_with(self, hand: Hand) -> None:
-        """Let the mouse press this sheet."""
-
         @self.cells.on_click
         async def click(event: Any) -> None:
             place = self._met(event.ray_origin, np.array(event.ray_direction))

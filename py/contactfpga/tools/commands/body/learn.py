@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(body: Body, plan: Plan, joint: str) -> None:
-    """Check the request before anybody moves the robot. Raises ValueError."""
     names = None if body.kinematics is None else body.kinematics.joint_names
     if names is not None and joint not in names:
         raise ValueError(f"joint {shown(joint)} is no joint of the URDF; it has {', '.join(names)}")

@@ -75,7 +75,6 @@ def _measured(text: str) -> tuple[str, float]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; returns 1 if a fault was found."""
     if not args.kit:
         raise ContactFPGAError(f"name a kit: --kit {' or '.join(kits.names())}")
     kit = kits.kit(args.kit)
@@ -185,7 +184,6 @@ def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
 
 
 def _opened(args: argparse.Namespace, kit: Kit, skin: Skin) -> tuple[Board, Person]:
-    """The board, built from the bring-up's or the kit's Skin, and the person."""
     person: Person = _Reader(args)
     port: str | SimulatedPort | None = args.port
     if port == REHEARSAL:

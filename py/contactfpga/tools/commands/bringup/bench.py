@@ -14,8 +14,6 @@ from contactfpga.skin import Skin
 
 
 class Person(Protocol):
-    """Whoever touches the sheet."""
-
     stuck_s: float
     """Time for which a switch stays pressed, while others change, to count as stuck."""
 
@@ -30,8 +28,6 @@ class Person(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """Result of one step."""
-
     name: str
     findings: tuple[Finding, ...]
     measured: dict[str, float] = dataclasses.field(default_factory=dict)
@@ -53,9 +49,7 @@ class Bench:
     person: Person
     stated: Circuit | None = None
     seconds: float = 1.0
-    """Time for counting frames."""
     timeout: float = 1.0
-    """Timeout of each frame, in s."""
     probability: float = PROBABILITY
     """Joint probability of the circuit's intervals."""
     images: dict[str, Settling] = dataclasses.field(default_factory=dict)

@@ -23,8 +23,6 @@ NOT_FITTED = (
 
 
 class Graded(NamedTuple):
-    """A prediction and its measurement."""
-
     prediction: Prediction
     measured: float
     within: float
@@ -32,7 +30,6 @@ class Graded(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the measurement agrees with the prediction."""
         one = self.prediction
         return one.low - self.within <= self.measured <= one.high + self.within
 
@@ -52,8 +49,6 @@ def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float])
 
 
 class BringUpReport:
-    """The findings so far."""
-
     def __init__(self, kit: Kit, skin: Skin, when: datetime.date):
         self.kit, self.skin, self.when = kit, skin, when
         self.steps: list[Step] = []

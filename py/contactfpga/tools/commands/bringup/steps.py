@@ -21,7 +21,6 @@ from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
 
 READS = 50
-"""Requests for the response time."""
 MOST_LOST = 0.1
 RULER = "Press a ruler's edge along each column, one after the other, half a second each."
 WATCHED_S = 0.1
@@ -233,7 +232,6 @@ def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: 
 
 
 def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
-    """Possible steps for this Skin."""
     if skin.report != "cells":
         return [link, lines]
     return [link, lines, switches, *[diodes] * skin.self_test, bounce, times.settling, times.circuit]

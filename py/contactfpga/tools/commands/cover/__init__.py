@@ -38,7 +38,6 @@ MM, KPA = 1e3, 1e-3
 
 
 def say(known: dict[str, Any]) -> int:
-    """Print an answer as one JSON object."""
     print(json.dumps(known, default=_plain, allow_nan=False))
     return 0
 
@@ -52,7 +51,6 @@ def _plain(value: object) -> object:
 
 
 def unsolved(answer: NoSolution, as_json: bool) -> int:
-    """Print the reason for a missing answer."""
     if as_json:
         say({"no_solution": answer.reason})
     else:
@@ -67,7 +65,6 @@ def table(*lines: tuple[str, str]) -> None:
 
 
 def notes(found: list[str]) -> int:
-    """Print the limits of a model."""
     for note in found:
         print(f"note: {note}")
     return 0

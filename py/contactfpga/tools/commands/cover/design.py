@@ -97,7 +97,6 @@ def _row(one: FoamDesign) -> tuple[str, ...]:
 
 
 def region_row(one: RegionLimits) -> tuple[str, ...]:
-    """Table row of a body region."""
     reaction = "any" if math.isinf(one.reaction_s) else f"{MM * one.reaction_s:.4g}" if one.reaction_s else "none"
     clamped = "none" if isinstance(one.clamped_m_s, NoSolution) else f"{one.clamped_m_s:.4g}"
     return (

@@ -49,7 +49,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _readings(board: Board, seconds: float) -> Floats:
-    """(m, n) readings of frames without a zone; raises :class:`HapticsError` for a touch."""
     if board.hello.units is None:
         raise ContactFPGAError(f"{board.port}: this board has no pressure units; build its Skin with units")
     found: list[tuple[float, ...]] = []

@@ -161,7 +161,6 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
 
 
 def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    """Save the finished runs beside an earlier whole table; returns the place."""
     from contactfpga_sim.lab.arm import pictures
 
     again = "run the same command again to go on from there"

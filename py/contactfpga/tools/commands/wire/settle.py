@@ -47,7 +47,6 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def settling(board: Board, skin: Skin) -> Settling:
-    """Receiver of this board's frames; raises :class:`ContactFPGAError` for a Skin that leaves nothing to measure."""
     derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
@@ -99,7 +98,6 @@ def _cells(zones: Zones) -> np.ndarray:
 
 
 def _restored(board: Board, timeout: float) -> list[Finding]:
-    """Restore sampling at the settle time; returns a finding on failure."""
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
         try:
             board.sample_at(0, timeout)
@@ -181,7 +179,6 @@ def _show_slow(found: Settling, per_us: int) -> None:
 
 
 def _show_back(found: Settling, per_us: int) -> None:
-    """Show columns that still read pressed in the next row."""
     late = np.flatnonzero(found.back_clocks > found.first).tolist()
     if late:
         named = [f"{column} ({found.back_clocks[column] / per_us:.2f} us)" for column in late[:NAMED]]
