@@ -12,8 +12,8 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import Timeline, units
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import heard
-from contactfpga_sim.verify.cosim.compare import Mismatch
 from contactfpga_sim.verify import aig
+from contactfpga_sim.verify.cosim.compare import Mismatch
 from contactfpga_sim.verify.mutants import campaign, netlist, proof, sheets, stimuli
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.verify.mutants.stimuli import Stimulus
