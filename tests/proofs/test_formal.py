@@ -1,5 +1,7 @@
 """The proofs hold, find the bugs planted for them, and the machinery around them can say no."""
 
+from functools import partial
+
 import pytest
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, wiring
@@ -148,6 +150,46 @@ def test_what_no_induction_of_this_depth_reaches_is_open():
 
     assert prove(never_seven, 1).outcome == "open"  # 7 follows 6; that nothing leads to 6 takes more clocks to see
     assert prove(never_seven, 4).outcome == "proved"
+
+
+def turns(proof, at_most=5, rest=0):
+    """The counter, never stopped, and at rest where it has the value ``rest``."""
+    dut = Counter()
+    proof.put(dut)
+    proof.m.d.comb += dut.enable.eq(1)
+    proof.claim(dut.count <= at_most)
+    proof.rests(dut.count == rest)
+
+
+@pytest.mark.parametrize("clocks", [0, 1, 2])
+def test_from_rest_to_rest_is_forever(clocks):
+    verdict = prove(turns, clocks)
+    assert (verdict.outcome, verdict.clocks) == ("proved", clocks + 6)  # 0 comes again after 6 clocks
+
+
+@pytest.mark.parametrize("clocks", [0, 1, 2])
+def test_what_fails_between_two_rests_is_not_proved(clocks):
+    assert prove(partial(turns, at_most=4), clocks).outcome != "proved"
+    assert prove(partial(turns, at_most=3, rest=2), clocks).outcome != "proved"
+
+
+def test_what_never_rests_is_open():
+    verdict = prove(partial(turns, rest=6), 1)
+    assert verdict.outcome == "open"
+    assert verdict.said.startswith("no rest in 100 clocks")
+
+
+def test_what_need_not_come_to_rest_again_is_open():
+    def stops(proof):
+        dut = Counter()
+        proof.put(dut)
+        proof.m.d.comb += dut.enable.eq(proof.free(1, "enable"))
+        proof.claim(dut.count <= 5)
+        proof.rests(dut.count == 0)
+
+    verdict = prove(stops, 0)
+    assert verdict.outcome == "open"
+    assert verdict.said.startswith("no rest in 100 clocks")
 
 
 def test_time_that_runs_out_is_open():

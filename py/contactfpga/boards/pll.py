@@ -31,7 +31,7 @@ ECP5_OUTPUT = 10 * MHZ, 400 * MHZ
 
 def dividers(cell: str, crystal_hz: int, clock_hz: int) -> Dividers:
     """The dividers for exactly this clock: those of the highest comparison frequency, then of the oscillator nearest to
-    the middle of its range. Raises SkinError with the nearest whole MHz if there are none."""
+    the middle of its range. Raises SkinError with the nearest whole MHz if no dividers give the clock."""
     clocks = _clocks(cell, crystal_hz)
     if clock_hz in clocks:
         return clocks[clock_hz]

@@ -245,7 +245,7 @@ async def _in_thread(call: Callable[[float], Found], timeout: float) -> Found:
 
 @runtime_checkable
 class Opening(Protocol):
-    """A tap that is told whose bytes it gets."""
+    """A tap that learns which board sends its bytes."""
 
     def opened(self, board: Board) -> None:
         """Called before the first byte."""

@@ -77,8 +77,10 @@ class Folds:
 
 
 def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = STEP_RAD) -> Folds:
-    """Folds from angles in rad and frames, taken with nobody near. Raises :class:`BodyError` for frames without
-    cells."""
+    """Learn folds from angles in rad and frames that were taken with nobody near.
+
+    Raises :class:`BodyError` for frames without cells.
+    """
     if not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
         raise BodyError(f"step_rad is {shown(step_rad)}; it must be a number from 0.0001 to 1")
     counts: dict[int, int] = {}

@@ -57,8 +57,8 @@ class LinkContact:
     track: int | None = None
     """Id that stays with the contact, unique on this link; None without a place or tracking."""
     fold: float | None = None
-    """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody
-    touches. None if unknown."""
+    """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 the fold
+    alone may explain the zone. None if unknown."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 

@@ -38,7 +38,7 @@ class Pressed:
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:
         """Standard deviation of each coordinate, over all places where a ball with about this push closes this many
-        switches; None if there is none."""
+        switches; None if no such place is known."""
         if not force_n > 0:
             return None
         step = round(math.log(force_n) / math.log(STEP))

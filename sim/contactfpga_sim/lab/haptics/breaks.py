@@ -1,4 +1,4 @@
-"""Where force joined to location fails: one assumption is violated more and more.
+"""Limits of force joined to location: each sweep violates one assumption more and more.
 
 Each value is tried with random contacts until it is clear whether the stated 95 % hold for 90 % of them. A failure
 counts as reported if half of the failing ones are.

@@ -27,7 +27,7 @@ def stream(rate: int) -> Path:
 
 
 def sizes_table() -> str:
-    """Sizes (but for chunk ends, machine-independent), and this machine's speeds."""
+    """Sizes of recordings, on all machines the same but for chunk ends, and speeds of this machine."""
     head = ("frames/s", "messages", "bytes per frame", "MB an hour", "frames per CPU second")
     rows = [head]
     with compute.folder() as place:

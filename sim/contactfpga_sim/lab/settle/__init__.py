@@ -1,1 +1,1 @@
-"""Where a precharged scan breaks."""
+"""Study of where a precharged scan breaks."""

@@ -22,8 +22,8 @@ REST = "rest"
 """Name of the output for :meth:`~contactfpga_sim.verify.proofs.proof.Proof.rests`."""
 
 
-class Clocks:
-    """A circuit in clocks that follow each other, as clauses of a solver."""
+class Unrolling:
+    """A circuit unrolled over successive clocks, as clauses of a solver."""
 
     def __init__(self, circuit: aig.Circuit, power_up: bool):
         """``power_up``: all registers start at 0; otherwise the solver chooses."""
@@ -39,45 +39,45 @@ class Clocks:
 
     def add(self) -> None:
         """Add a clock. In the one before, all claims hold."""
-        self.hold(self._bad ^ 1)
+        self.assume(self._bad ^ 1)
         inputs = [self._graph.variable() for _ in self._circuit.inputs]
         placed = self._graph.place(self._circuit, inputs, self._latches)
         self._variables.append((inputs, self._latches))
         for literal in placed.given:
-            self.hold(literal)
+            self.assume(literal)
         self._latches, self._bad = placed.nexts, self._graph.any(placed.bad)
         self.rest = next((at for name, at in zip(placed.outputs, placed.driven) if name == f"{REST}[0]"), 0)
 
-    def hold(self, literal: int) -> None:
+    def assume(self, literal: int) -> None:
         """Assume that the literal holds."""
         self._define()
         if literal != 1:
             self._solver.add_clause([_signed(literal)] if literal else [])
 
-    def possible(self, *literals: int) -> bool:
-        """Whether these can hold together."""
+    def satisfiable(self, *literals: int) -> bool:
+        """Whether the literals can hold together."""
         self._define()
         if 0 in literals:
             return False
         return bool(self._solver.solve([_signed(literal) for literal in literals if literal != 1]))
 
-    def broken(self) -> bool:
-        """Whether a claim can fail in the newest clock, on a way that comes to no state twice: others can be
-        shortened."""
-        while self.possible(self._bad):
+    def violated(self) -> bool:
+        """Whether a claim can fail in the newest clock of a run that repeats no state. A shortest counterexample from
+        power-up repeats none, so neither does any part of it."""
+        while self.satisfiable(self._bad):
             holds, seen = self._holds(), dict[tuple[bool, ...], Sequence[int]]()
             for _, latches in self._variables:
                 state = tuple(map(holds, latches))
                 if state in seen:
                     pairs = zip(seen[state], latches, strict=True)
-                    self.hold(self._graph.any(self._graph.differ(*pair) for pair in pairs))
+                    self.assume(self._graph.any(self._graph.differ(*pair) for pair in pairs))
                     break
                 seen[state] = latches
             else:
                 return True
         return False
 
-    def told(self) -> str:
+    def trace(self) -> str:
         """The solver's last choice: inputs and registers that are not 0, a line per clock."""
         holds, lines = self._holds(), []
         for number, (inputs, latches) in enumerate(self._variables):
@@ -112,7 +112,7 @@ def _signed(literal: int) -> int:
 
 
 LONGEST = 100
-"""Clocks from power-up to rest, at most."""
+"""Most clocks without rest."""
 
 Found = tuple[str, int, str]
 """Outcome, clocks, and the solver's choice where a claim fails."""
@@ -120,56 +120,61 @@ Found = tuple[str, int, str]
 
 def search(circuit: aig.Circuit, clocks: int) -> Found:
     """Whether claims hold in the first clocks from power-up."""
-    run = Clocks(circuit, power_up=True)
+    run = Unrolling(circuit, power_up=True)
     for clock in range(clocks):
         run.add()
-        if run.broken():
-            return "counterexample", clock, run.told()
+        if run.violated():
+            return "counterexample", clock, run.trace()
     return "proved", clocks, ""
 
 
 def prove(circuit: aig.Circuit, clocks: int) -> Found:
     """Whether claims that held in as many clocks, at most ``clocks``, hold in the next one, and at power-up."""
-    start, step = Clocks(circuit, power_up=True), Clocks(circuit, power_up=False)
+    start, step = Unrolling(circuit, power_up=True), Unrolling(circuit, power_up=False)
     step.add()
     for clock in range(clocks):
         start.add()
-        if start.broken():
-            return "counterexample", clock, start.told()
+        if start.violated():
+            return "counterexample", clock, start.trace()
         step.add()
-        if not step.broken():
+        if not step.violated():
             return "proved", clock + 1, ""
-    return "open", clocks, step.told()
+    return "open", clocks, step.trace()
 
 
 def prove_from_rest(circuit: aig.Circuit, clocks: int) -> Found:
-    """Whether claims hold from each clock at rest, with ``clocks`` clocks before it, to the next, which must come.
+    """Whether claims hold from each clock at rest to the next, which must come within :data:`LONGEST` clocks.
 
-    All clocks are then near one whose lemmas pin registers down, which spares the solver most of its search.
+    The solver chooses the registers ``clocks`` clocks before rest. Lemmas pin them down there, which spares it most of
+    the search of :func:`prove`.
     """
-    start = Clocks(circuit, power_up=True)
+    start = Unrolling(circuit, power_up=True)
     for clock in range(clocks + LONGEST):
         start.add()
-        if start.broken():
-            return "counterexample", clock, start.told()
+        if start.violated():
+            return "counterexample", clock, start.trace()
         if clock >= clocks:
-            start.hold(start.rest ^ 1)
-        if not start.possible():
+            start.assume(start.rest ^ 1)
+        if not start.satisfiable():
             break
     else:
-        return "open", clock, f"no rest in {LONGEST} clocks\n{start.told()}"
-    step = Clocks(circuit, power_up=False)
+        return "open", clock, _restless(start)
+    step = Unrolling(circuit, power_up=False)
     for _ in range(clocks + 1):
         step.add()
-    step.hold(step.rest)
-    number = clocks
-    while step.possible():
+    step.assume(step.rest)
+    for clock in range(clocks, clocks + LONGEST):
+        if not step.satisfiable():
+            return "proved", clock, ""
         step.add()
-        number += 1
-        if step.broken():
-            return "open", number, step.told()
-        step.hold(step.rest ^ 1)
-    return "proved", number, ""
+        if step.violated():
+            return "open", clock + 1, step.trace()
+        step.assume(step.rest ^ 1)
+    return "open", clocks + LONGEST, _restless(step)
+
+
+def _restless(run: Unrolling) -> str:
+    return f"no rest in {LONGEST} clocks\n{run.trace()}"
 
 
 def main() -> int:

@@ -40,11 +40,11 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     dut = RunLabeller(skin_of(rows, columns, connectivity, closed))
     inside = proof.put(dut)
     valid, cells, last = rows_into(proof, dut)
-    y = Signal(range(rows))
-    with proof.m.If(valid & dut.rows.ready):
+    y, handed = Signal(range(rows)), valid & dut.rows.ready
+    with proof.m.If(handed):
         proof.m.d.sync += y.eq(Mux(last, 0, y + 1))
     proof.lemma(inside["walk.y_next"] == y)
-    _records(proof, dut, inside, Cat(valid & dut.rows.ready, last, cells, y), partial(weights_of, dut.derived))
+    _records(proof, dut, inside, Cat(handed, last, cells, y), partial(weights_of, dut.derived))
 
 
 class MarkedLabeller(RunLabeller):
@@ -151,10 +151,10 @@ def _records(proof: Proof, dut: RunLabeller, inside: Inside, offered, weights) -
         proof.claim(ends_now == expected_end)
     proof.rests(taken | done & ~newer[0])
     _lemmas(proof, dut, inside, open_row, taken | done, done & ~taken & ~newer[0])
-    next_taken, next_last, next_row_, next_y = newer
+    next_taken, next_last, next_cells, next_y = newer
     with m.If(next_taken):
         row_before = Mux(taken, Mux(taken_last, 0, row), open_row.cells)
-        _loaded(proof, dut, inside, row_before, next_row_, next_last, next_y)
+        _loaded(proof, dut, inside, row_before, next_cells, next_last, next_y)
     return open_row, [older, newer]
 
 
@@ -289,7 +289,7 @@ _SPECIFICATION_BUGS = (Bug("zones of one row do not merge", RowStep, "next_reach
 
 
 REST_CLOCKS = 2
-"""What is known of the two clocks before a row is done completes what is known of the labeller at rest."""
+"""Clocks before rest in the induction: the lemmas of two clocks pin the labeller down, those of rest alone do not."""
 
 
 def _case(columns: int, connectivity: int, rows: int = 4, closed: bool = False, **options) -> ProofCase:
