@@ -361,7 +361,7 @@ def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatc
     compute.accuracy(task(), 0)
     compute.accuracy(task(), 0)
     assert len(calls) == 20
-    monkeypatch.setattr(kept.sources, "digest", lambda *_: "other code")
+    monkeypatch.setattr(kept.sources, "digest", lambda *_, **__: "other code")
     compute.accuracy(task(), 0)
     assert len(calls) == 40
 

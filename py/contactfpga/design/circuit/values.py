@@ -60,7 +60,7 @@ class Circuit:
     line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
     """Capacitance of a line to ground, with its pin."""
     crossing_pf: float = field(default=2.0, metadata={"limits": (0.0, 1000.0, "pF")})
-    """Capacitance of a row to a column at a crossing with an open switch."""
+    """Capacitance of a row to a column at their crossing, with an open switch, in pF."""
     neighbor_pf: float = field(default=3.0, metadata={"limits": (0.0, 10_000.0, "pF")})
     """Capacitance of a line to each neighbor."""
     pin_ohm: float = field(default=40.0, metadata={"limits": (1.0, 10_000.0, "ohm")})
