@@ -2,15 +2,17 @@
 
 from functools import partial
 
-from amaranth.hdl import Cat, Const, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Fragment, Mux, Signal, Value
+from amaranth.lib import data
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
-from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.verify.proofs.case import Bug, ProofCase
+from contactfpga_hdl.payloads import moments_layout, zone_layout
+from contactfpga_sim.verify.proofs.case import Bug, ProofCase, plant
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of
+from contactfpga_sim.verify.proofs.marked import Marks, marked_skin
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.zones import (
     OpenRow,
@@ -34,7 +36,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
     Claimed: wanted memory data are available, nothing is written to a place in use or outside the table, no word is
     used that was read during its write, the brackets' nesting fits, and after a frame no place is in use.
     """
-    dut, inside, open_row = _labeller(proof, columns, connectivity, rows, closed, proof.lemma)
+    dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
+    inside, open_row = _labeller(proof, dut, dut, proof.lemma)
     m, places = proof.m, dut.derived.open_zones
     live = Signal(places)  # in use: by zones of the row before that are to come or of the new row, or groups that wait
     groups, wanted, whole, final = inside.part("groups"), inside["wanted"], inside["whole"], inside["last"]
@@ -76,32 +79,91 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     Claimed: when a row can be taken, the zones that end with the previous row have left, each once, and after a last
     row one end mark; that is so after at most C + e + 2 clocks, on a closed sheet two more.
     """
-    _labeller(proof, columns, connectivity, rows, closed, proof.claim)
+    dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
+    _labeller(proof, dut, dut, proof.claim)
+
+
+def cells_leave_together(proof: Proof, columns: int, connectivity: int) -> None:
+    """The labeller with two marked cells of each frame in place of moments, which it adds as those of a cell
+    (:func:`a_cell_is_added`).
+
+    Free: rows at any time, and the marked cells. Assumed: records are taken at once.
+
+    Claimed: as in :func:`records_are_the_zones`; a mark is never added to itself.
+    """
+    dut = SerialLabeller(marked_skin(_skin(4, columns, connectivity, closed=False)))
+    marks = Marks(proof, columns)
+
+    def cell_of(inside: Inside):
+        column = inside["column"]
+        return Mux(inside["adds"], marks.within(column, column + 1, inside["y"]), 0)
+
+    def added(right, inside: Inside):
+        """The cell's marks in place of its area and of its column's lowest bit."""
+        grows = inside["enable"] & inside["active"] & ~inside["closes"]
+        share = Mux(inside["adds"], Cat(Const(1), inside["column"][0]), 0)
+        return right ^ Mux(grows, ~_found(inside)[: len(right)] & (cell_of(inside) ^ share), 0)
+
+    plant(Bug("marks, not moments", SerialLabeller, "moments", added), design := Fragment.get(dut, None))
+    inside, open_row = _labeller(proof, dut, design, proof.claim, marks)
+    kept = Value.cast(inside["moments"])
+    cell, found = cell_of(inside), _found(inside)[: len(kept)]
+    proof.claim((cell & kept | cell & found | kept & found) == 0)
+    with proof.m.If(dut.rows.ready):
+        marks.in_one_zone(open_row, marks.passed)
+
+
+def a_cell_is_added(proof: Proof, columns: int, connectivity: int) -> None:
+    """Free: rows at any time, and when records are taken.
+
+    Claimed: a group's moments grow by those of the column's cell or by those that are found, never by both.
+    """
+    dut = SerialLabeller(_skin(16, columns, connectivity, closed=False))
+    inside = proof.put(dut)
+    rows_into(proof, dut)
+    proof.m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
+    _nothing_beyond(proof, dut, inside)
+    proof.lemma(~inside["active"] | (inside["column"] < columns) & ~inside["mark"] & ~inside["tail"])
+    started = proof.before(Const(1))  # at power-up it is not known what the memory reads
+    proof.lemma(~started | proof.before(inside["wanted"]) | (_found(inside) == 0))
+    grows = inside["enable"] & inside["active"] & ~inside["closes"]
+    layout = moments_layout(dut.derived)
+    kept, found = (data.View(layout, value[: layout.size]) for value in (inside["moments"], _found(inside)))
+    for name, weights in weights_of(dut.derived, inside["y"]).items():
+        here = sum(Mux(inside["column"] == x, weights[x], 0) for x in range(columns))
+        wider = proof.before(kept[name] + Mux(inside["adds"], here, found[name]))
+        proof.claim(~proof.before(grows) | (kept[name] == wider[: len(kept[name])]))
+    with proof.m.If(started & grows & inside["adds"]):
+        proof.claim(found.as_value() == 0)
 
 
 def _labeller(
-    proof: Proof, columns: int, connectivity: int, rows: int, closed: bool, claim
-) -> tuple[SerialLabeller, Inside, OpenRow]:
-    m = proof.m
-    dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
-    inside = proof.put(dut)
+    proof: Proof, dut: SerialLabeller, design: SerialLabeller | Fragment, claim, marks: Marks | None = None
+) -> tuple[Inside, OpenRow]:
+    """Claims, in ``claim``, and lemmas of the labeller ``design``, whose ports are those of ``dut``."""
+    m, derived = proof.m, dut.derived
+    columns, closed = derived.skin.columns, derived.skin.closed
+    inside = proof.put(design)
     valid, cells, last = rows_into(proof, dut)
     m.d.comb += dut.records.ready.eq(1)
-    wanted = proof.chosen(zone_layout(dut.derived).size, "wanted")
+    wanted = proof.chosen(zone_layout(derived).size, "wanted")
     handed, record = valid & dut.rows.ready, dut.records.payload
+    if marks is None:
+        weights = weights_of(derived, _row_number(proof, dut, inside, handed, last))
+    else:
+        weights = marks.weights(marks.numbers(dut, handed, last), columns)
 
-    y = Signal(range(rows))
-    open_row = empty_row(dut.derived)
-    after, ended = next_row(m, dut.derived, open_row, cells, last, wanted, weights_of(dut.derived, y))
+    open_row = empty_row(derived)
+    after, ended = next_row(m, derived, open_row, cells, last, wanted, weights)
     expected, expected_end = Signal(range(2 * columns + 1)), Signal()
     seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
     seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
     ends_now = seen_ends + (dut.records.valid & record.end)
-    longest = columns + dut.derived.open_zones + 2 + 2 * closed
+    longest = columns + derived.open_zones + 2 + 2 * closed
     age = Signal(range(longest + 2), init=longest)
     with m.If(handed):
         m.d.sync += [*open_row.copy(after, when=~last), expected.eq(ended), expected_end.eq(last)]
-        m.d.sync += [seen.eq(0), seen_ends.eq(0), age.eq(1), y.eq(Mux(last, 0, y + 1))]
+        m.d.sync += [seen.eq(0), seen_ends.eq(0), age.eq(1)]
     with m.Else():
         m.d.sync += [seen.eq(seen_now), seen_ends.eq(ends_now), age.eq(Mux(dut.rows.ready, longest, age + 1))]
     claim((age < longest) | (age == longest) & dut.rows.ready)
@@ -110,14 +172,32 @@ def _labeller(
         claim(seen_now == expected)
         claim(ends_now == expected_end)
         _at_rest(proof, dut, inside, open_row)
-        proof.lemma(Mux(inside["last"], 0, inside["y"] + 1)[: len(y)] == y)
     open_rows_agree(proof, open_row)
     if isinstance(open_row, TurnedRow):
         turned_rows_agree(proof, open_row)
+    _nothing_beyond(proof, dut, inside)
+    return inside, open_row
+
+
+def _row_number(proof: Proof, dut: SerialLabeller, inside: Inside, handed, last) -> Signal:
+    y = Signal(range(dut.derived.skin.rows))
+    with proof.m.If(handed):
+        proof.m.d.sync += y.eq(Mux(last, 0, y + 1))
+    with proof.m.If(dut.rows.ready):
+        proof.lemma(Mux(inside["last"], 0, inside["y"] + 1)[: len(y)] == y)
+    return y
+
+
+def _nothing_beyond(proof: Proof, dut: SerialLabeller, inside: Inside) -> None:
+    """Lemma: words of the table that have no place are 0."""
     place_bits = len(inside["first"])
     for place in range(dut.derived.open_zones, 2 << place_bits):
         proof.lemma((place < 1 << place_bits) | (inside.word("groups", place) == 0))
-    return dut, inside, open_row
+
+
+def _found(inside: Inside) -> Value:
+    """The word that the table reads; moments come first."""
+    return Value.cast(inside.part("groups").read_ports[0].data)
 
 
 def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
@@ -146,9 +226,8 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
     proof.lemma(inside["whole"] & ~inside["has_run"] & (inside["moments"] == 0))
     if derived.skin.closed:
         proof.lemma(~inside["at_seam"])
-    found = Value.cast(inside.part("groups").read_ports[0].data)
     started = proof.before(Const(1))  # at power-up it is not known what the memory reads
-    proof.lemma(~started | (found == 0))
+    proof.lemma(~started | (_found(inside) == 0))
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
@@ -209,6 +288,12 @@ _OVERFLOW_BUGS = (
 )  # fmt: skip
 
 
+_CELL_BUGS = (
+    Bug("a cell is added with what is found", SerialLabeller, "adds", lambda _, inside: inside["cells"][0]),
+    Bug("columns are not added", SerialLabeller, "moments", lambda moments, _: moments[0]),
+)  # fmt: skip
+
+
 def _case(
     claim, columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options
 ) -> ProofCase:
@@ -216,6 +301,12 @@ def _case(
     title = f"serial: {claim.__name__.replace('_', ' ')}"
     size = f"{columns} columns, {rows} rows, {connectivity}-connected{', closed' * closed}"
     return ProofCase(title, size, build, clocks, **options)
+
+
+def _marked(claim, columns: int, connectivity: int, **options) -> ProofCase:
+    build = partial(claim, columns=columns, connectivity=connectivity)
+    title = f"serial: {claim.__name__.replace('_', ' ')}"
+    return ProofCase(title, f"{columns} columns, {connectivity}-connected", build, 2, **options)
 
 
 CASES = (
@@ -227,6 +318,13 @@ CASES = (
     _case(records_are_the_zones, 3, 4, 2, campaign=True),
     _case(records_are_the_zones, 3, 8, 2, rows=2, closed=True, campaign=True, bugs=_CLOSED_BUGS, bug_clocks=14),
     _case(records_are_the_zones, 3, 4, 2, rows=2, closed=True, campaign=True),
+    _marked(cells_leave_together, 3, 8, bugs=tuple(bug for bug in _BUGS if bug.signal != "y"), bug_clocks=14),
+    _marked(cells_leave_together, 3, 4),
+    _marked(cells_leave_together, 8, 8, campaign=True),
+    _marked(cells_leave_together, 8, 4, campaign=True),
+    _marked(a_cell_is_added, 8, 8, bugs=_CELL_BUGS, bug_clocks=14),
+    _marked(a_cell_is_added, 16, 8),
+    _marked(a_cell_is_added, 16, 4),
     _case(nothing_overflows, 1, 8, 2),
     _case(nothing_overflows, 2, 4, 2),
     _case(nothing_overflows, 3, 8, 2, bugs=_OVERFLOW_BUGS, bug_clocks=17),

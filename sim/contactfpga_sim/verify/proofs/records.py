@@ -3,18 +3,16 @@
 from functools import partial
 
 from amaranth.hdl import Cat, Const, Fragment, Mux, Signal, Value
-from amaranth.lib import wiring
 
-from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.around import Unwrap
 from contactfpga_hdl.label.join import Brackets, Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import Walk, place_of
-from contactfpga_hdl.payloads import labeller_ports, moments_layout, zone_layout
+from contactfpga_hdl.payloads import moments_layout, zone_layout
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase, plant
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of, walk_is_sound
+from contactfpga_sim.verify.proofs.marked import Marks, marked_skin
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.zones import (
     OpenRow,
@@ -47,70 +45,42 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     _records(proof, dut, inside, Cat(handed, last, cells, y), partial(weights_of, dut.derived))
 
 
-class MarkedLabeller(RunLabeller):
-    """A labeller that has, instead of moments, a bit for each of two marked cells, which a row's number names."""
-
-    def __init__(self, skin: Skin):
-        self.derived = _Marked(skin)
-        wiring.Component.__init__(self, labeller_ports(self.derived))
-
-
-class _Marked(Derived):
-    area_bits = sum_x_bits = 1
-    sum_y_bits = 0
-    skips = True  # rows come with their numbers
-
-
 def cells_leave_together(proof: Proof, columns: int, connectivity: int) -> None:
-    """The labeller with two marked cells of each frame in place of moments.
+    """The labeller with two marked cells of each frame in place of moments, which a step adds as those of its run
+    (:func:`a_run_has_its_cells`).
 
-    Moments are sums over cells: a step adds those of its run (:func:`a_run_has_its_cells`), and groups are added up.
-    So a zone's are right if each of its cells is added once, and no other.
-
-    Free: any rows at any time, and of each frame two cells in columns chosen once. Assumed: records are taken at once.
+    Free: any rows at any time, and the marked cells. Assumed: records are taken at once.
 
     Claimed: as in :func:`records_are_the_zones`; a mark is never added to itself, and a run has a cell.
     """
-    m = proof.m
-    dut = MarkedLabeller(skin_of(4, columns, connectivity))
-    marked = [proof.chosen(range(columns), name) for name in ("one", "other")]
+    dut = RunLabeller(marked_skin(skin_of(4, columns, connectivity)))
+    marks = Marks(proof, columns)
 
-    def marks(_, inside: Inside):
+    def of_run(_, inside: Inside):
         step = inside.component.step
-        here = ((step.start <= x) & (x < step.past) & step.y[i] for i, x in enumerate(marked))
-        return Mux(step.has_run, Cat(*here), 0)
+        return Mux(step.has_run, marks.within(step.start, step.past, step.y), 0)
 
-    plant(Bug("marks, not moments", Join, "decided.run", marks), design := Fragment.get(dut, None))
+    plant(Bug("marks, not moments", Join, "decided.run", of_run), design := Fragment.get(dut, None))
     inside = proof.put(design)
     valid, cells, last = rows_into(proof, dut)
-    m.d.comb += dut.rows.payload.y.eq(y := proof.free(len(marked), "y"))
     handed = valid & dut.rows.ready
-    passed = Signal(len(marked))  # marks that were handed over in this frame
-    proof.given(~handed | (y & passed == 0))
-    with m.If(handed):
-        m.d.sync += passed.eq(Mux(last, 0, passed | y))
-
-    def weights(y):
-        return {name: [y[i] & (marked[i] == x) for x in range(columns)] for i, name in enumerate(("area", "sum_x"))}
-
-    open_row, rows = _records(proof, dut, inside, Cat(handed, last, cells, y), weights)
+    offered = Cat(handed, last, cells, marks.numbers(dut, handed, last))
+    open_row, rows = _records(proof, dut, inside, offered, partial(marks.weights, columns=columns))
     walk, sums = inside.part("walk"), inside.part("sum")
-    with m.If(walk.step_valid & ~walk.step.end & walk.step.has_run):
+    with proof.m.If(walk.step_valid & ~walk.step.end & walk.step.has_run):
         proof.claim(walk.step.start < walk.step.past)
     run, kept, found = (Value.cast(part) for part in (sums.join.run, inside["sum.kept"], inside["sum.found"]))
-    with m.If(sums.valid & ~sums.join.end):
+    with proof.m.If(sums.valid & ~sums.join.end):
         proof.claim((run & kept | run & found | kept & found) == 0)
-    met: Value = Signal(len(marked))  # in the open row's frame
+    met: Value = Signal.like(marks.passed)  # in the open row's frame
     taken, taken_last, _, taken_y = rows[0]
-    with m.If(taken):
-        m.d.sync += met.eq(Mux(taken_last, 0, met | taken_y))
-    for i, name in enumerate(("area", "sum_x")):
-        zones = sum((leader & open_row.moments[x][name] for x, leader in enumerate(open_row.leaders())), Const(0))
-        proof.lemma(zones <= met[i])
+    with proof.m.If(taken):
+        proof.m.d.sync += met.eq(Mux(taken_last, 0, met | taken_y))
+    marks.in_one_zone(open_row, met)
     for there, its_last, _, its_y in rows:
         proof.lemma(~there | (its_y & met == 0))
         met = Mux(there, Mux(its_last, 0, met | its_y), met)
-    proof.lemma(passed == met)
+    proof.lemma(marks.passed == met)
 
 
 def _records(proof: Proof, dut: RunLabeller, inside: Inside, offered, weights) -> tuple[OpenRow, list[tuple]]:
