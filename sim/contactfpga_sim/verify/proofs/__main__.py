@@ -28,6 +28,7 @@ from contactfpga_sim.verify.proofs import (
     uart,
     units,
     upset,
+    words,
 )
 from contactfpga_sim.verify.proofs.case import ProofCase
 
@@ -47,6 +48,7 @@ CASES: tuple[ProofCase, ...] = (
     *label_serial.CASES,
     *streams.CASES,
     *pack.CASES,
+    *words.CASES,
     *link.CASES,
     *reports.CASES,
     *uart.CASES,
