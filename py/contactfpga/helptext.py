@@ -66,14 +66,22 @@ def fields(kind: type) -> Iterator[Field]:
         return
     body = tree.body[0]
     if isinstance(body, ast.ClassDef):
+        stated = {one.name: one.metadata.get("limits") for one in getattr(kind, "__dataclass_fields__", {}).values()}
         for field in _declared(body.body):
             if not field.name.startswith("_"):
-                yield field
+                limits = stated.get(field.name)
+                yield field._replace(text=field.text + _range(*limits)) if limits else field
+
+
+def _range(low: float, high: float, unit: str = "") -> str:
+    return f" From {low:,.12g} to {high:,.12g} {unit}".rstrip() + "."
 
 
 def _declared(body: list[ast.stmt]) -> Iterator[Field]:
     for statement, following in zip(body, [*body[1:], ast.Pass()]):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            given = {one.arg: one.value for one in getattr(statement.value, "keywords", ())}
+            statement.value = given.get("default", statement.value)
             yield Field(statement.target.id, ast.unparse(statement), _text(following))
         elif isinstance(statement, ast.FunctionDef) and statement.name == "__init__":
             yield from _assigned(statement.body)

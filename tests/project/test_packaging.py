@@ -49,7 +49,7 @@ def test_all_names_of_the_package_are_there():
         assert getattr(contactfpga, name).__class__
         assert name in dir(contactfpga)
     assert set(contactfpga._PLACES) == set(contactfpga.__all__) - {"__version__"}
-    assert contactfpga.skin.limits.__name__ == "contactfpga.skin.limits"
+    assert contactfpga.skin.sheet.__name__ == "contactfpga.skin.sheet"
     with pytest.raises(AttributeError, match="module 'contactfpga' has no attribute 'zonse'"):
         contactfpga.zonse  # noqa: B018
 

@@ -68,6 +68,13 @@ def test_what_just_keeps_the_limits_is_taken(changes):
     assert all(getattr(skin, name) == value for name, value in changes.items() if name != "mask")
 
 
+def test_limits_are_told_by_field():
+    assert Skin.limits("rows") == Skin(rows=8).limits("columns") == (1, 64, "")
+    assert Skin.limits("baud") == (1200, 200_000_000, "bits per second")
+    with pytest.raises(KeyError):
+        Skin.limits("name")
+
+
 @pytest.mark.parametrize("radius_mm", [3.3, 10.0, 12.5, 25.4, 100.0])
 def test_a_cylinder_takes_as_many_columns_as_the_message_says(radius_mm):
     fields = {"surface": "cylinder", "radius_mm": radius_mm, **LONG}

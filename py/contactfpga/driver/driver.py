@@ -19,7 +19,7 @@ from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import SerialTransport, SimulatedPort, Transport, connect
 from contactfpga.errors import AddressError, BoardClosed, PortBusy, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
-from contactfpga.skin import Skin, limits
+from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
@@ -68,9 +68,9 @@ def open(
         skin = Skin.load(skin, trust)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
-    elif not isinstance(baud, int) or not limits.MIN_BAUD <= baud <= limits.MAX_CLOCK_HZ // 2:
-        most = limits.MAX_CLOCK_HZ // 2
-        raise ValueError(f"baud is {shown(baud)}; it must be a whole number from {limits.MIN_BAUD} to {most}")
+    low, high, _ = Skin.limits("baud")
+    if not isinstance(baud, int) or not low <= baud <= high:
+        raise ValueError(f"baud is {shown(baud)}; it must be a whole number from {low} to {high}")
     if isinstance(record, str | Path):
         recording.check(record)
     elif record is not None and not hasattr(record, "take"):

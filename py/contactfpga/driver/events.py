@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contactfpga.driver.clock import Timeline
 from contactfpga.driver.stats import Stats
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.skin import Skin, limits
+from contactfpga.skin import Skin
 from contactfpga.skin.derived import Widths
 from contactfpga.wire.faults import STUCK, UNNAMED, Faults, SelfTestSlot, decode_faults
 from contactfpga.wire.hello import Hello
@@ -134,7 +134,7 @@ def longest_pause_s(hello: Hello | Skin, skin: Skin | None) -> float:
     """
     wire_s = (Widths(hello.sheet).max_frame_bytes + BETWEEN_BYTES) * 10 / hello.baud
     if hello.send == "on_change":
-        return (limits.MAX_KEEP_ALIVE_MS if skin is None else skin.keep_alive_ms) / 1000 + wire_s
+        return (Skin.limits("keep_alive_ms")[1] if skin is None else skin.keep_alive_ms) / 1000 + wire_s
     return wire_s + (0.0 if skin is None else skin.derived.max_frame_clocks / hello.clock_hz)
 
 

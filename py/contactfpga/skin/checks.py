@@ -13,8 +13,8 @@ from contactfpga.choices import converters, debounces, labellers, scans
 from contactfpga.choices.choice import Choice
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
-from contactfpga.skin import limits
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.sheet import MIN_AROUND
 from contactfpga.skin.units import MAX_SUMS, MAX_WEIGHT
 
 if TYPE_CHECKING:
@@ -95,18 +95,13 @@ def _check_name(name: object) -> None:
         raise SkinError(f"name is {shown(name)}; it must be a string")
     if not name.isprintable() or name != name.strip():
         raise SkinError(f"name is {shown(name)}; it must be printable, with no spaces around it")
-    if len(name.encode()) > limits.MAX_NAME_BYTES:
-        raise SkinError(
-            f"name is {shown(name)}, {len(name.encode())} bytes of UTF-8; at most {limits.MAX_NAME_BYTES} are possible"
-        )
+    if (count := len(name.encode())) > 32:
+        raise SkinError(f"name is {shown(name)}, {count} bytes of UTF-8; at most 32 are possible")
 
 
 def check_sheet(skin: Skin) -> dict[str, Any]:
     """Check sheet, wiring and scan; returns the sorted mask, and the line orders as tuples."""
-    for name in ("rows", "columns"):
-        _within(name, getattr(skin, name), 1, limits.MAX_LINES)
-    for name in ("pitch_x_mm", "pitch_y_mm"):
-        _within(name, getattr(skin, name), limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
+    _within(skin, "rows", "columns", "pitch_x_mm", "pitch_y_mm")
     mask = _check_mask(skin)
     _check_registers(skin)
     _check_precharge(skin)
@@ -166,7 +161,7 @@ def _check_registers(skin: Skin) -> None:
         if getattr(skin, wiring) == "direct":
             _left_out(skin, f"{kind}_chains", f"set {wiring} = '{registers}'")
             continue
-        _within(f"{kind}_chains", chains, 1, lines)
+        _within(skin, f"{kind}_chains", ends=(1, lines, ""))
         length = math.ceil(lines / chains)
         filled = math.ceil(lines / length)
         if filled < chains:
@@ -175,7 +170,7 @@ def _check_registers(skin: Skin) -> None:
                 f"{kind}_chains is {shown(chains)}; {lines} {kind}s{guarded} in chains of {length} fill {filled}, set "
                 f"{kind}_chains = {filled}"
             )
-    _within("shift_hz", skin.shift_hz, limits.MIN_SHIFT_HZ, limits.MAX_SHIFT_HZ, "Hz")
+    _within(skin, "shift_hz")
     if skin.row_drive == skin.column_read == "direct":
         _left_out(skin, "shift_hz", "set row_drive = '74hc595' or column_read = '74hc165'")
 
@@ -210,30 +205,31 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
 
 
 def check_link(skin: Skin) -> None:
-    _within("barycenter_bits", skin.barycenter_bits, 0, limits.MAX_BARYCENTER_BITS)
+    _within(skin, "barycenter_bits")
     if skin.report != "barycenter":
         _left_out(skin, "barycenter_bits", "set report = 'barycenter'")
-    if skin.clock_hz % 1_000_000 or not 1_000_000 <= skin.clock_hz <= limits.MAX_CLOCK_HZ:
-        raise SkinError(f"clock_hz is {shown(skin.clock_hz)}; it must be a whole number of MHz from 1 to 400 MHz")
-    _within("baud", skin.baud, limits.MIN_BAUD, skin.clock_hz // 2, "for this clock")
+    low, high, _ = skin.limits("clock_hz")
+    if skin.clock_hz % 1_000_000 or not low <= skin.clock_hz <= high:
+        ends = f"{low // 1_000_000} to {high // 1_000_000} MHz"
+        raise SkinError(f"clock_hz is {shown(skin.clock_hz)}; it must be a whole number of MHz from {ends}")
+    _within(skin, "baud", ends=(skin.limits("baud")[0], skin.clock_hz // 2, "for this clock"))
     divisor = round(skin.clock_hz / skin.baud)
     error = skin.clock_hz / divisor / skin.baud - 1
-    if abs(error) > limits.MAX_BAUD_ERROR:
+    if abs(error) > _MAX_BAUD_ERROR:
         nearest = sorted({skin.clock_hz // d for d in (divisor - 1, divisor, divisor + 1) if d >= 2})
         raise SkinError(
             f"baud is {skin.baud}: a clock of {skin.clock_hz} Hz misses it by {100 * error:+.2f} %, the limit is "
-            f"{100 * limits.MAX_BAUD_ERROR} %; nearest good rates: {', '.join(map(str, nearest))}"
+            f"{100 * _MAX_BAUD_ERROR} %; nearest good rates: {', '.join(map(str, nearest))}"
         )
     if skin.send == "on_change":
-        _within("keep_alive_ms", skin.keep_alive_ms, 0.0, limits.MAX_KEEP_ALIVE_MS, "ms")
+        _within(skin, "keep_alive_ms")
 
 
 def check_timing(skin: Skin) -> None:
     """Check times, zone capacity, and that each row is processed before the next."""
     assert skin.zone_capacity is not None
-    _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
-    for name in ("settle_us", "release_us", "precharge_us", "project_us"):
-        _within(name, getattr(skin, name), 0.0, limits.MAX_ROW_US, "us")
+    _within(skin, "zone_capacity", ends=(1, skin.max_zones(), "for this sheet"))
+    _within(skin, "settle_us", "release_us", "precharge_us", "project_us")
     derived = skin.derived
     megahertz = skin.clock_hz // 1_000_000
     for name in ("settle_us", "release_us", "project_us", *(["precharge_us"] if skin.precharge_us else [])):
@@ -248,10 +244,9 @@ def check_timing(skin: Skin) -> None:
             f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
         )
     _check_keep_alive(skin, derived)
-    if not derived.debounced:
-        return
-    for name in ("debounce_press_us", "debounce_release_us"):
-        _within(name, getattr(skin, name), 0.0, limits.MAX_DEBOUNCE_SCANS * derived.frame_clocks / megahertz, "us")
+    if derived.debounced:
+        longest_us = _MAX_DEBOUNCE_SCANS * derived.frame_clocks / megahertz
+        _within(skin, "debounce_press_us", "debounce_release_us", ends=(0.0, longest_us, "us"))
 
 
 def _check_keep_alive(skin: Skin, derived: Derived) -> None:
@@ -274,12 +269,14 @@ def _left_out(skin: Skin, name: str, instead: str) -> None:
         raise SkinError(f"{name} is {shown(value)}; leave it out, or {instead}")
 
 
-def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    if not low <= value <= high:
-        raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())
+def _within(skin: Skin, *names: str, ends: tuple[float, float, str] | None = None) -> None:
+    for name in names:
+        low, high, unit = ends or skin.limits(name)
+        if not low <= (value := getattr(skin, name)) <= high:
+            raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())
 
 
-_PITCH_TOLERANCE = 1e-3
+_PITCH_TOLERANCE, _MAX_BAUD_ERROR, _MAX_DEBOUNCE_SCANS = 1e-3, 0.015, 4095
 
 
 def check_surface(skin: Skin) -> dict[str, float]:
@@ -292,7 +289,7 @@ def check_surface(skin: Skin) -> dict[str, float]:
         return {}
     if skin.radius_mm is None:
         raise SkinError("radius_mm is missing; surface = 'cylinder' needs it")
-    _within("radius_mm", skin.radius_mm, 0.1, 100_000.0, "mm")
+    _within(skin, "radius_mm")
     around_mm = 2 * math.pi * skin.radius_mm
     return _check_closed(skin, around_mm) if skin.closed else _check_gap(skin, around_mm)
 
@@ -309,8 +306,8 @@ def _check_gap(skin: Skin, around_mm: float) -> dict[str, float]:
 
 
 def _check_closed(skin: Skin, around_mm: float) -> dict[str, float]:
-    if skin.columns < limits.MIN_AROUND:
-        raise SkinError(f"columns is {skin.columns}; closed = true needs at least {limits.MIN_AROUND}")
+    if skin.columns < MIN_AROUND:
+        raise SkinError(f"columns is {skin.columns}; closed = true needs at least {MIN_AROUND}")
     if skin.ghosts:
         raise SkinError("diodes is 'none'; closed = true needs 'col2row' or 'row2col'")
     if skin.report == "barycenter":
@@ -325,10 +322,11 @@ def _check_closed(skin: Skin, around_mm: float) -> dict[str, float]:
             f"pitch_x_mm is {skin.pitch_x_mm}; {skin.columns} columns around a radius of {skin.radius_mm:g} mm have "
             f"{pitch_mm:g} mm, leave it out"
         )
-    if not limits.MIN_PITCH_MM <= pitch_mm <= limits.MAX_PITCH_MM:
+    low, high, unit = skin.limits("pitch_x_mm")
+    if not low <= pitch_mm <= high:
         raise SkinError(
             f"{skin.columns} columns around a radius of {skin.radius_mm:g} mm have a pitch of {pitch_mm:g} mm; it must "
-            f"lie between {limits.MIN_PITCH_MM} and {limits.MAX_PITCH_MM} mm"
+            f"lie between {low} and {high} {unit}"
         )
     return {"pitch_x_mm": pitch_mm}
 

@@ -10,8 +10,7 @@ from contactfpga.choices import debounces, labellers, scans
 from contactfpga.choices.labellers import Labeller
 from contactfpga.choices.reports import REPORTS, Report
 from contactfpga.choices.scans import Scan
-from contactfpga.skin.limits import MAX_LINES
-from contactfpga.skin.sheet import Sheet
+from contactfpga.skin.sheet import MAX_LINES, Sheet
 from contactfpga.skin.units import Units
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from contactfpga.skin.limits import MAX_BARYCENTER_BITS, MAX_LINES, MIN_AROUND
+MAX_LINES, MIN_AROUND, MAX_BARYCENTER_BITS = 64, 3, 8
+"""Limits of a sheet; ``MIN_AROUND``: least columns if its ends meet."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

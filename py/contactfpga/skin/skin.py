@@ -7,6 +7,7 @@ import functools
 import hashlib
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,9 +21,9 @@ from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown, suggestion
-from contactfpga.skin import checks, limits
+from contactfpga.skin import checks
 from contactfpga.skin.derived import Derived
-from contactfpga.skin.sheet import Sheet, max_zones
+from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -40,17 +41,17 @@ class Skin:
     name: str = ""
     """What the board calls itself, at most 32 bytes of UTF-8; not in the fingerprint."""
 
-    rows: int = 16
-    """Driven lines, 1 to 64."""
-    columns: int = 16
-    """Read lines, 1 to 64."""
-    pitch_x_mm: float = 10.0
+    rows: int = field(default=16, metadata={"limits": (1, MAX_LINES, "")})
+    """Driven lines."""
+    columns: int = field(default=16, metadata={"limits": (1, MAX_LINES, "")})
+    """Read lines."""
+    pitch_x_mm: float = field(default=10.0, metadata={"limits": (0.01, 1000.0, "mm")})
     """Distance between columns in mm."""
-    pitch_y_mm: float = 10.0
+    pitch_y_mm: float = field(default=10.0, metadata={"limits": (0.01, 1000.0, "mm")})
     """Distance between rows in mm."""
     surface: Literal["plane", "cylinder"] = "plane"
     """``plane``, or ``cylinder``: columns run around the link's z axis, rows along it."""
-    radius_mm: float | None = None
+    radius_mm: float | None = field(default=None, metadata={"limits": (0.1, 100_000.0, "mm")})
     """Radius of the sheet on a cylinder in mm; None on a plane."""
     closed: bool = False
     """Whether the sheet's ends meet: the last column is a neighbor of the first, and ``pitch_x_mm`` follows from the
@@ -74,13 +75,13 @@ class Skin:
     scan: ScanName | Scan = "raster"
     """``raster`` drives one row after the other; ``adaptive`` drives untouched rows together; ``reversal`` drives all
     columns and reads the rows, and then drives only touched rows."""
-    settle_us: float = 5.0
+    settle_us: float = field(default=5.0, metadata={"limits": (0.0, 10_000.0, "us")})
     """Time a row is driven before its columns are sampled, in us."""
-    release_us: float = 1.0
+    release_us: float = field(default=1.0, metadata={"limits": (0.0, 10_000.0, "us")})
     """Time without a driven row before the next one, in us; with precharge at least ``precharge_us`` and two clocks."""
-    precharge_us: float = 0.0
+    precharge_us: float = field(default=0.0, metadata={"limits": (0.0, 10_000.0, "us")})
     """Time for which the board drives the columns to the released level before it drives a row, in us; 0: never."""
-    project_us: float = 1.0
+    project_us: float = field(default=1.0, metadata={"limits": (0.0, 10_000.0, "us")})
     """Time for which ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers."""
@@ -90,7 +91,7 @@ class Skin:
     """``direct``: a pin per column; ``74hc165``: columns on shift registers."""
     column_chains: int = 1
     """Chains of 74HC165 that are shifted at once; columns are spread over them as in ``row_chains``."""
-    shift_hz: int = 8_000_000
+    shift_hz: int = field(default=8_000_000, metadata={"limits": (10_000, 50_000_000, "Hz")})
     """Highest shift clock in Hz; the actual one is clock_hz divided by a whole number, at least 2."""
     debounce: DebounceName | Debounce = "none"
     """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as in the keyboard firmware QMK."""
@@ -109,14 +110,14 @@ class Skin:
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: a bitmap
     of the pressed cells.
     """
-    barycenter_bits: int = 4
+    barycenter_bits: int = field(default=4, metadata={"limits": (0, MAX_BARYCENTER_BITS, "")})
     """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
     send: Literal["always", "on_change"] = "always"
     """``always``: every frame is sent. ``on_change``: only keep-alives, and frames whose cells differ from the last
     one.
     """
-    keep_alive_ms: float = 100.0
-    """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
+    keep_alive_ms: float = field(default=100.0, metadata={"limits": (0.0, 100.0, "ms")})
+    """Longest pause between frames with ``send = "on_change"``, in ms."""
     zone_capacity: int | None = None
     """Most zones that a frame carries. Default: the most that can occur up to 32x32, at most 256 above that, and at
     most 64 with ``report = "barycenter"``.
@@ -141,9 +142,9 @@ class Skin:
     """Up to four weighted sums of the units' deviations from their zeros; each has a weight from -127 to 127 per unit.
     """
 
-    clock_hz: int = 12_000_000
+    clock_hz: int = field(default=12_000_000, metadata={"limits": (1_000_000, 400_000_000, "Hz")})
     """Clock of the gateware in Hz, a whole number of MHz."""
-    baud: int = 3_000_000
+    baud: int = field(default=3_000_000, metadata={"limits": (1200, 200_000_000, "bits per second")})
     """Bits per second on the wire."""
 
     def __post_init__(self) -> None:
@@ -179,6 +180,12 @@ class Skin:
             return cls(**{**(usual or {}), **values})
         except SkinError as error:
             raise SkinError(f"{path}: {error}") from None
+
+    @classmethod
+    def limits(cls, name: str) -> tuple[Any, Any, str]:
+        """Least and greatest value of a field, and their unit; KeyError for a field whose values have none."""
+        low, high, unit = cls.__dataclass_fields__[name].metadata["limits"]
+        return low, high, unit
 
     def replace(self, **changes: Any) -> "Skin":
         """A copy with some fields changed, checked again. ``zone_capacity`` returns to its default if the sheet
@@ -278,7 +285,7 @@ class Skin:
     def _default_capacity(self) -> int:
         small = self.rows <= 32 and self.columns <= 32
         most = self.max_zones() if small else min(self.max_zones(), 256)
-        return min(most, limits.MAX_DIVIDED_ZONES) if REPORTS[self.report].divided else most
+        return min(most, 64) if REPORTS[self.report].divided else most
 
 
 def _suggesting(init: Callable[..., None]) -> Callable[..., None]:

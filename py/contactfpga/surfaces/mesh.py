@@ -12,7 +12,7 @@ import numpy as np
 from contactfpga.inputs import array_file
 from contactfpga.inputs.array_file import ArrayFileError
 from contactfpga.inputs.files import replaced
-from contactfpga.skin.limits import MAX_LINES
+from contactfpga.skin.sheet import MAX_LINES
 from contactfpga.surfaces.shapes import Floats, SurfaceError, Vector, is_one, length, vector
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")

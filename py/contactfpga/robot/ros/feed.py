@@ -11,7 +11,7 @@ from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.convert import Message, markers, outline
 from contactfpga.robot.ros.settings import TOPICS, Settings
-from contactfpga.skin.limits import MAX_KEEP_ALIVE_MS
+from contactfpga.skin import Skin
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Event, Tracks
 from contactfpga.zones.zone import Zones
@@ -75,7 +75,7 @@ class Diagnostics:
     def __init__(self, board: Board, name: str, silence_s: float):
         self._board = board
         self._name = name
-        self._silence_s = silence_s + (MAX_KEEP_ALIVE_MS / 1000 if board.hello.send == "on_change" else 0)
+        self._silence_s = silence_s + (Skin.limits("keep_alive_ms")[1] / 1000 if board.hello.send == "on_change" else 0)
         self._heard_s = self._since_s = board.clock()
         self._before: dict[str, int] = {}
         self._waited_s = 0.0

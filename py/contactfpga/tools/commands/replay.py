@@ -7,7 +7,7 @@ import json
 import time
 
 from contactfpga import terminal
-from contactfpga.skin import limits
+from contactfpga.skin import Skin
 from contactfpga.tools.console import numbers
 
 EXTRA = "sim"
@@ -21,7 +21,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
     pitch = "Distance between rows and between columns in mm (default: 10)."
     parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, metavar="MM", help=pitch)
-    bits = numbers.whole(0, limits.MAX_BARYCENTER_BITS)
+    bits = numbers.whole(*Skin.limits("barycenter_bits"))
     divided = "Divide barycenters on the board, to 1/2^K cell."
     parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
     ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."

@@ -14,7 +14,7 @@ from contactfpga.design.circuit.static import NOISE_V
 from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.design.circuit.values import LIMITS
 from contactfpga.errors import UNSOLVED
-from contactfpga.skin import Skin, limits
+from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers
 
 EXTRA = None
@@ -23,7 +23,7 @@ EXTRA = None
 def add_flags(parser: argparse.ArgumentParser) -> None:
     skin = "Skin that gives rows, columns, diodes and the table [circuit]; flags below replace values of that table."
     flags.sheet(parser, skin)
-    lines = numbers.whole(1, limits.MAX_LINES, "lines")
+    lines = numbers.whole(*Skin.limits("rows")[:2], "lines")
     parser.add_argument("--rows", type=lines, metavar="N", help="Number of rows (default: the Skin's, or 16).")
     parser.add_argument("--columns", type=lines, metavar="N", help="Number of columns (default: the Skin's, or 16).")
     direction = "Direction of the diodes (default: the Skin's, or col2row)."

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import TypeVar
 
-from contactfpga.skin import limits
+from contactfpga.skin import Skin
 
 _Number = TypeVar("_Number", int, float)
 
@@ -64,8 +64,8 @@ def _between(
 
 
 SECONDS = number(0, 86_400, "s", above=True)
-BAUD = whole(limits.MIN_BAUD, limits.MAX_CLOCK_HZ // 2, "bits per second")
-PITCH_MM = number(limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
+BAUD = whole(*Skin.limits("baud"))
+PITCH_MM = number(*Skin.limits("pitch_x_mm"))
 CELL = number(-1e300, 1e300)
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")

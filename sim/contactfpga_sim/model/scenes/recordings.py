@@ -11,14 +11,14 @@ import numpy as np
 
 from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
-from contactfpga.skin.limits import MAX_LINES, MAX_PITCH_MM, MIN_PITCH_MM
+from contactfpga.skin.sheet import MAX_LINES
 from contactfpga_sim.model.scenes import cells
 
 DEFAULT_HZ = 100.0
 """Default playback rate."""
 
 
-_RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": (MIN_PITCH_MM, MAX_PITCH_MM)}
+_RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": Skin.limits("pitch_x_mm")[:2]}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from contactfpga.choices.debounces import DEBOUNCES
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.choices.reports import REPORTS
 from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.limits import MIN_AROUND
-from contactfpga.skin.sheet import max_zones
+from contactfpga.skin.sheet import MIN_AROUND, max_zones
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import KIND, command, request
 from contactfpga_sim.model.golden.trace import Timeline
