@@ -10,6 +10,7 @@ import pytest
 
 from contactfpga.inputs.array_file import ArrayFileError, read
 from contactfpga.skin import Skin
+from contactfpga_sim.lab.fit.sources import source
 from contactfpga_sim.model.scenes import scene
 from contactfpga_sim.model.scenes.cells import pressed
 from contactfpga_sim.model.scenes.recordings import Recording
@@ -49,8 +50,6 @@ def test_what_is_neither_is_refused(values, threshold, message):
 
 @pytest.mark.parametrize("suffix", ["npy", "npz"])
 def test_files_and_commands_share_the_rule(tmp_path, suffix):
-    from contactfpga_sim.lab.fit.sources import source  # imports much of SciPy
-
     path = tmp_path / f"touch.{suffix}"
     frames = np.repeat(VALUES, 4, axis=0)
     np.save(path, frames) if suffix == "npy" else np.savez(path, pressed=frames)
