@@ -9,6 +9,8 @@ import tomllib
 import numpy as np
 import pytest
 from model_board import DirectPort
+from planted_sheets import CIRCUIT as COMMON_CIRCUIT
+from planted_sheets import SKIN as COMMON
 from sample import sample
 
 import contactfpga
@@ -108,8 +110,8 @@ ERRORS = [KeyboardInterrupt(), contactfpga.ReadTimeout("no frame came")]
 
 @pytest.mark.parametrize("error", sample(ERRORS, quick=ERRORS[:1], slow=ERRORS[1:]))
 def test_what_was_found_is_told_and_the_board_left_as_it_was(capsys, error):
-    """It ends while the board samples early, in the middle of a frame."""
-    pressed, stops = np.ones((4, 4), bool), [0.03125]
+    """It ends while the board samples early, in the middle of a frame. Other tests compile this board as well."""
+    pressed, stops = np.ones((COMMON.rows, COMMON.columns), bool), [0.03125]
 
     def scene(now):
         if stops and now > stops[0]:
@@ -117,7 +119,7 @@ def test_what_was_found_is_told_and_the_board_left_as_it_was(capsys, error):
             raise error
         return pressed
 
-    with board_of(scene) as board:
+    with contactfpga.open(VirtualBoard(COMMON, scene, circuit=COMMON_CIRCUIT), skin=COMMON) as board:
         assert settle.measure(board, arguments(None)) == 0
         assert not stops
         for _ in range(3):

@@ -116,6 +116,7 @@ def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
         assert abs(zone.y_mm - y * 5.0) <= zones.rounding_mm[1] + 1e-9
 
 
+@pytest.mark.slow  # it compiles a board; test_cosim.py has boards that divide in Amaranth's simulator
 def test_the_compiled_board_is_the_golden_models_in_every_clock():
     cycles = 40 * SHEET.rows * SHEET.derived.row_clocks
     timeline = stimulus(SHEET, cycles, seed=6)
@@ -157,12 +158,11 @@ def skin_with_rows_of(clocks, fields):
         return Skin(settle_us=(clocks - 1) / 12, release_us=1 / 12, baud=6_000_000, **fields)
 
 
-def test_a_skin_with_other_fraction_bits_is_another_one(scene):
-    skin, frames, _ = scene
-    port = f"sim://?scene={frames}&skin={skin}"
-    contactfpga.open(port, SHEET).close()
-    with pytest.raises(contactfpga.SkinMismatch, match="barycenter_bits is 3, asked for was 4"):
-        contactfpga.open(port, SHEET.replace(barycenter_bits=4))
+def test_a_skin_with_other_fraction_bits_is_another_one():
+    with FakeBoard(SHEET) as board:
+        contactfpga.open(board.path, SHEET, timeout=60.0).close()
+        with pytest.raises(contactfpga.SkinMismatch, match="barycenter_bits is 3, asked for was 4"):
+            contactfpga.open(board.path, SHEET.replace(barycenter_bits=4), timeout=60.0)
 
 
 @pytest.mark.slow

@@ -113,6 +113,7 @@ def test_covering_set_touches_every_flag_and_counter():
     assert seen == {"hello", "heard", "overflow", "overwritten", "fault", "cells"}
 
 
+@pytest.mark.slow  # test_pack.py has blocks around 254 bytes, clock by clock
 @pytest.mark.parametrize("connectivity", sample([4, 8], quick=[8]))
 def test_frames_longer_than_a_stuffing_block(connectivity):
     """More than 254 bytes without a zero: dense bitmap rows of an odd sheet."""

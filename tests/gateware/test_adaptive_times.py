@@ -114,14 +114,12 @@ def test_contact_rises_within_a_settle_time_and_four_clocks_of_any_touch():
 
 def test_contact_falls_with_a_frame_without_a_press():
     known = facts(TALL)
-    cells = np.zeros((1, 8, 3), bool)
-    with CompiledBoard(TALL, ("contact", "rows")) as board:
-        cells[0, 2, 1] = True
-        board.hold(cells, 40 * known.row_clocks + 5)
-        cells[0, 2, 1] = False
-        board.hold(cells, 20 * known.row_clocks)
-        (_, up, _), (fall, down, _) = board.take("contact").tolist()
-        ends = [cycle for cycle, _, last in board.take("rows").tolist() if last]
+    touched, untouched = np.zeros((2, 8, 3), bool)
+    touched[2, 1] = True
+    timeline = Timeline([(0, touched, None), (40 * known.row_clocks + 5, untouched, None)])
+    trace = bench_amaranth.run(TALL, timeline, 60 * known.row_clocks + 5)
+    (_, up, *_), (fall, down, *_) = trace.contact
+    ends = [cycle for cycle, _, last in trace.rows if last]
     assert (up, down) == (1, 0)
     whole = [end for end in ends if end > 40 * known.row_clocks + 5 + 2 * known.row_clocks]
     assert fall <= whole[0], "two row times a frame: the probe, the row"

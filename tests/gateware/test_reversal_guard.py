@@ -147,7 +147,7 @@ def in_turn(rng, spacing: int, lasts: int) -> tuple[list[int], list[tuple[int, C
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
 def test_at_rest_each_break_at_each_place_is_told_after_two_checks_and_nothing_else(bench, soon, rng, diodes):
     skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
-    spacing = 900
+    spacing = 540
     at, cuts = in_turn(rng, spacing, 100)
     words = live(bench, skin, Timeline([], cuts=cuts), at[-1] + spacing).words
     for start, (cut, wanted) in zip(at, breaks(3, 2), strict=True):
@@ -165,7 +165,7 @@ def test_two_checks_at_rest_come_within_one_ms():
 def test_each_break_at_each_place_is_told_within_two_frames_whatever_is_pressed(bench, monkeypatch, rng, diodes):
     monkeypatch.setattr(reversal, "RETRY_BIT", 7)
     skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
-    spacing = 800
+    spacing = 560
     at, cuts = in_turn(rng, spacing, 250)
     pieces = []
     for start in range(0, at[-1] + spacing, 25):

@@ -125,6 +125,7 @@ def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
     board.stop()
 
 
+@pytest.mark.slow  # it compiles two sheets; test_several.py has their bytes, and those of one pass above
 def test_several_sheets_share_the_pseudo_terminal():
     with PtyBoard(Several(SHEETS), "full") as board:
         with contactfpga.open(f"{board.port}#1", timeout=60) as back:
