@@ -15,7 +15,7 @@ from contactfpga_sim.lab.view import browser
 
 SIZE = 1120, 660
 ANGLES = {"L_ELBOW_P": -0.8, "L_SHOULDER_R": 1.2}
-"""In rad: the arm is raised aside, so that the labels of its two contacts are apart."""
+"""In rad; a raised arm parts the labels of its contacts."""
 SIDE = Side(np.array([0.9, 0.3, 0.3]), np.array([0.0, 0.0, 1.0]))
 LOWEST_M = -0.05
 """Height of the hips in the base frame."""
@@ -23,7 +23,7 @@ SETTLED_MS = 3000
 
 
 def draw(folder: Path) -> Path:
-    """The upper body with its contacts, each with its label."""
+    """The upper body with labeled contacts."""
     image = folder / "robot.png"
     robot = opening.ViewRequest(port=str(examples() / "robot.toml"))
     with opening.opened(robot, http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:
