@@ -74,10 +74,11 @@ def test_an_option_says_what_the_class_says_of_its_value():
     parser.complete()
     told = {action.dest: action.help for action in parser._actions}
     assert told["crossing_pf"] == (
-        "Capacitance of a row to a column at their crossing, with an open switch, in pF (default: 2)."
+        "Capacitance of a row to a column at their crossing, with an open switch (default: 2 pF)."
     )
-    assert told["pin_ma"].endswith("with its usual drive strength (default: 8).")  # the first sentence alone
-    assert told["diode_grading"] == "M (schottky: 0.5)."
+    assert told["diode_saturation_a"] == "Saturation current (schottky: 1.5e-07 A)."
+    assert told["pin_ma"].endswith("with its usual drive strength (default: 8 mA).")  # the first sentence alone
+    assert told["diode_grading"] == "Grading coefficient (schottky: 0.5)."
 
 
 def test_a_sheet_that_cannot_work_says_which_and_what_helps(capsys):

@@ -54,6 +54,7 @@ class Slow:
     """Outliers, and times near the settle time."""
 
     cells: list[tuple[int, int]]
+    """(row, column)."""
     rows: list[int]
     columns: list[int]
 

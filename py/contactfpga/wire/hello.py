@@ -62,6 +62,7 @@ class Hello:
 
     sheet: Sheet
     fingerprint: bytes
+    """The Skin's eight bytes."""
     name: str
     """Name of the Skin."""
     clock_hz: int

@@ -54,8 +54,9 @@ _ALL = (
             ),
             "folds": Section("tables:folds_table", kept=r"^\| 5 ", sample="tables:folds_sample"),
         },
-        pictures="tables:draw",
+        pictures="picture:draw",
         extra="test",
+        needs=("chromium",),
     ),
     Study(
         "c",

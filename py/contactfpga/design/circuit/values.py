@@ -31,13 +31,18 @@ def _check_limits(where: str, values: Diode | Circuit) -> None:
 class Diode:
     """A Shockley junction with series resistance and depletion charge: SPICE's IS, N, RS, CJO, VJ and M."""
 
-    saturation_a: float = field(metadata={"limits": (1e-18, 1e-3), "spice": "IS"})
+    saturation_a: float = field(metadata={"limits": (1e-18, 1e-3, "A"), "spice": "IS"})
+    """Saturation current."""
     emission: float = field(metadata={"limits": (0.5, 5.0), "spice": "N"})
-    series_ohm: float = field(metadata={"limits": (0.0, 1000.0), "spice": "RS"})
-    junction_pf: float = field(metadata={"limits": (0.0, 1000.0), "spice": "CJO"})
-    """Capacitance at 0 V."""
-    junction_v: float = field(metadata={"limits": (0.1, 2.0), "spice": "VJ"})
+    """Emission coefficient."""
+    series_ohm: float = field(metadata={"limits": (0.0, 1000.0, "ohm"), "spice": "RS"})
+    """Series resistance."""
+    junction_pf: float = field(metadata={"limits": (0.0, 1000.0, "pF"), "spice": "CJO"})
+    """Junction capacitance at 0 V."""
+    junction_v: float = field(metadata={"limits": (0.1, 2.0, "V"), "spice": "VJ"})
+    """Junction potential."""
     grading: float = field(metadata={"limits": (0.0, 0.9), "spice": "M"})
+    """Grading coefficient."""
 
     def __post_init__(self) -> None:
         _check_limits("diode", self)
@@ -60,7 +65,7 @@ class Circuit:
     line_pf: float = field(default=30.0, metadata={"limits": (0.1, 100_000.0, "pF")})
     """Capacitance of a line to ground, with its pin."""
     crossing_pf: float = field(default=2.0, metadata={"limits": (0.0, 1000.0, "pF")})
-    """Capacitance of a row to a column at their crossing, with an open switch, in pF."""
+    """Capacitance of a row to a column at their crossing, with an open switch."""
     neighbor_pf: float = field(default=3.0, metadata={"limits": (0.0, 10_000.0, "pF")})
     """Capacitance of a line to each neighbor."""
     pin_ohm: float = field(default=40.0, metadata={"limits": (1.0, 10_000.0, "ohm")})

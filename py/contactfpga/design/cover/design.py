@@ -27,7 +27,7 @@ STEPS = 6
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """A limit and the compared value."""
+    """A limit and the compared value, in SI units."""
 
     name: str
     value: float

@@ -27,7 +27,9 @@ class Model(NamedTuple):
     """A medium and a contact."""
 
     within: str
+    """``halfspace``, ``bonded`` or ``frictionless``."""
     contact: str
+    """``point`` or ``patch``."""
 
     def __str__(self) -> str:
         return f"{self.within}, {self.contact}"

@@ -200,6 +200,7 @@ class Task:
     contact: str = "point"
     """``patch``: the sheet must feel the impact's own contact; ``point``: anything."""
     tolerance: float = TOLERANCE
+    """Largest relative error of the model."""
     skin: Skin = dataclasses.field(default_factory=Skin)
     """The sheet whose latency is compared."""
     other_s: float = 0.0

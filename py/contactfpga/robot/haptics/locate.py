@@ -100,13 +100,17 @@ class Observations:
     """The observations of one contact, and their evidence on its place."""
 
     cells: Sequence[tuple[int, int]]
+    """(row, column) of each pressed cell."""
     force_n: float
     closings: Sequence[Closing]
     center: Place | None
     pitches_m: tuple[float, float]
+    """Along x and y."""
     lines: tuple[int, int]
+    """Rows and columns of the sheet."""
     reach: Reach
     spread: float
+    """Relative standard deviation of the thresholds."""
     force_sigma_n: float
 
     def evidence(self, x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
@@ -182,6 +186,7 @@ class Place:
     radius_m: float
     """The contact is within this distance in 95 of 100 cases, if it follows the contact model."""
     covariance_m2: Floats
+    """(2, 2), of x and y."""
     method: str
     """`center of pressure`, `barycenter`, `set` or `closings`; `+ center of pressure` if combined."""
     agrees: bool = True

@@ -14,7 +14,8 @@ EXTRA = "sim"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.design(parser, "Skin of the board (default: the reference Skin).")
-    parser.add_argument("--scene", metavar="NAME", help="What touches the sheet: a scene's name or a .npy file.")
+    touching = "What touches the sheet: a scene's name or a .npy file (default: nothing)."
+    parser.add_argument("--scene", metavar="NAME", help=touching)
     parser.add_argument("--symlink", metavar="PATH", help="Create this symbolic link to the pseudo-terminal.")
 
 

@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     pitch = "Distance between rows and between columns in mm (default: 10)."
     parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, metavar="MM", help=pitch)
     bits = numbers.whole(*Skin.limits("barycenter_bits"))
-    divided = "Divide barycenters on the board, to 1/2^K cell."
+    divided = "Divide barycenters on the board, to 1/2^K cell (default: the host divides)."
     parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
     ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."
     parser.add_argument("--closed", action="store_true", help=ends)

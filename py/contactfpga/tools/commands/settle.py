@@ -30,21 +30,28 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--diodes", choices=("col2row", "row2col"), help=direction)
     usual = Circuit()
     values = parser.add_argument_group("circuit")
-    meanings = {one.name: " ".join(one.text.split()).partition(". ")[0] for one in helptext.fields(Circuit)}
+    meanings = _meanings(Circuit)
     for name, (low, high, unit) in LIMITS.items():
         flag = "--pf" if name == "line_pf" else _flag(name)
-        words = f"{meanings.get(name, '').rstrip('.')} (default: {getattr(usual, name):g})."
+        words = f"{meanings.get(name, '')} (default: {getattr(usual, name):g} {unit})."
         kind = numbers.number(low, high, unit)
         values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
     diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
     diode.add_argument("--diode", choices=tuple(DIODES), help="Kind; it gives the values below that you leave out.")
+    meanings = _meanings(Diode)
     for one in dataclasses.fields(Diode):
-        kind, spice = numbers.number(*one.metadata["limits"]), one.metadata["spice"]
-        words = f"{spice} (schottky: {getattr(usual.diode, one.name):g})."
+        (low, high, *unit), spice = one.metadata["limits"], one.metadata["spice"]
+        kind = numbers.number(low, high, *unit)
+        words = " ".join([f"{meanings.get(one.name, '')} (schottky: {getattr(usual.diode, one.name):g}", *unit]) + ")."
         diode.add_argument(_flag(f"diode_{one.name}"), type=kind, metavar=spice, help=words)
     factor = f"Recommended times are this many times those computed (default: {MARGIN:g})."
     parser.add_argument("--margin", type=numbers.number(1, 10), default=MARGIN, metavar="FACTOR", help=factor)
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+
+
+def _meanings(kind: type) -> dict[str, str]:
+    """The first sentence on each field, without its period."""
+    return {one.name: " ".join(one.text.split()).partition(". ")[0].rstrip(".") for one in helptext.fields(kind)}
 
 
 def _flag(name: str) -> str:

@@ -8,8 +8,7 @@ touch, positive into the obstacle.
 - Foam pressed in by delta: F = K_s delta^1.5 (1 + c d delta/dt), and K_b (delta - e) more once foam of thickness e is
   pressed flat on its base.
 
-The torque sensor sits between motor and arm and reads J d omega/dt + sum d F: it falls when the motor turns back, while
-F still rises.
+The torque sensor between motor and arm reads J d omega/dt + sum d F.
 """
 
 from __future__ import annotations

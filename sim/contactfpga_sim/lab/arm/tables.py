@@ -110,7 +110,6 @@ def defense_table() -> str:
 
 
 def step_table() -> str:
-    """Results over integrator steps, and the largest change by halving."""
     lines = [["step, us", "way", "closes, ms", "torque before, Nm", "peak force, N", "at rest, ms", "largest change"]]
     for way in ("latency", "uart"):
         before: list[float] | None = None

@@ -1,4 +1,4 @@
-"""Registration by pressing points; tables and pictures of docs/body.md."""
+"""Registration by pressing points; tables of docs/body.md."""
 
 from __future__ import annotations
 
@@ -7,23 +7,18 @@ import itertools
 import math
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from contactfpga import examples
-from contactfpga import picture_style as style
-from contactfpga.driver.address import Sim
-from contactfpga.robot.body import Body, BodyError, LinkState, registration
+from contactfpga.robot.body import BodyError, registration
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan, read
 from contactfpga.robot.body.registration import Press
-from contactfpga.robot.body.snapshot import on_link
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.body import folding, outages
 from contactfpga_sim.model.scenes import contacts
-from contactfpga_sim.model.scenes.scene import Contact, Scene, scene
+from contactfpga_sim.model.scenes.scene import Contact, Scene
 
 FINGER_MM = 9.0
 MARGIN_MM = 15.0
@@ -142,60 +137,3 @@ def _folds(sweeps: int) -> tuple[str, ...]:
     found = folding.rates(sweeps, count=1500)
     values = (found.folds, found.apart, found.joined, found.within, found.straight)
     return (str(sweeps), *(f"{100 * value:.1f}" for value in values))
-
-
-def draw(folder: Path) -> Path:
-    """The example's robot from two sides, with sheets and contacts."""
-    import matplotlib
-
-    body = Body.load(examples() / "robot.toml")
-    kinematics = body.kinematics
-    assert kinematics is not None
-    angles = dict.fromkeys(kinematics.joint_names, 0.0) | {"L_ELBOW_P": -0.8}
-    with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(5.4)
-        for axes, (across, title) in zip(
-            figure.subplots(1, 2, sharey=True), ((1, "from the front"), (0, "from the right"))
-        ):
-            for joint in kinematics.robot.joints.values():
-                ends = [kinematics.pose(link, angles).point_m for link in (joint.parent, joint.child)]
-                axes.plot(
-                    [end[across] for end in ends],
-                    [end[2] for end in ends],
-                    color=style.GRID,
-                    lw=5,
-                    solid_capstyle="round",
-                    label="lines from joint to joint of the robot",
-                )
-            for name, plan in body.links.items():
-                cells = _draw_sheet(axes, plan, kinematics.pose(plan.frame, angles), across)
-                if across == 1:
-                    spot = (cells[:, 1].mean(), cells[:, 2].max() + 0.01)
-                    axes.text(*spot, name.replace("_", " "), ha="center", va="bottom", fontsize=style.SMALL)
-            axes.set(title=title, aspect="equal", xlabel=f"{'xy'[across]}, m", ylim=(-0.85, 0.85), xlim=(-0.6, 0.6))
-            axes.grid(True)
-        figure.axes[0].set_ylabel("z, m")
-        handles, names = figure.axes[0].get_legend_handles_labels()
-        kept = dict(zip(names, handles))
-        figure.legend(kept.values(), kept.keys(), loc="outside lower center", ncols=4)
-        return style.save(figure, folder / "body.svg")
-
-
-def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> np.ndarray:
-    """Draw a sheet; return its (cells, 3) places in m."""
-    skin = plan.skin
-    x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
-    cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])
-    axes.plot(cells[:, across], cells[:, 2], ".", ms=1.2, color=style.SKY)
-    axes.plot([], [], "s", ms=5, color=style.SKY, label="cells of the sheets")
-    asked = Sim.parse(plan.port or "sim://").scene
-    zones = folding.frame_of(scene(skin, asked)(0.0), skin.replace(report="cells"))
-    for one in on_link(plan, LinkState(zones, 0.0, "ok", "", 0.0)):
-        contact = one.moved(pose, "base")
-        assert contact.point_m is not None
-        assert contact.normal is not None
-        tip = np.array(contact.point_m) + 0.12 * np.array(contact.normal)
-        ends = ([contact.point_m[across], tip[across]], [contact.point_m[2], tip[2]])
-        axes.plot(ends[0][0], ends[1][0], "o", ms=5, color=style.VERMILLION, label="contacts")
-        axes.plot(*ends, color=style.VERMILLION, lw=1.5, label="their normals")
-    return cells

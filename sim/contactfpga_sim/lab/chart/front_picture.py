@@ -108,7 +108,6 @@ def save(points: Sequence[Point], path: Path) -> Path:
 
 
 def picture(points: Sequence[Point]) -> Figure:
-    """Miscounts and barycenter error over time from the foam's first touch."""
     figure = style.new(5.2)
     method = to_build(points)
     some = {point.task.method: point for point in points if point.task.family == FAMILY}

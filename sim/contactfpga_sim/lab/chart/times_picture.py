@@ -29,7 +29,6 @@ TITLE = f"{FAMILY}, to the last byte of the first frame with a contact: median, 
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw one family's points; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
         return style.save(picture([point for point in points if point.task.family == FAMILY]), path)
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga import picture_style as style
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.rated import Rated
 from contactfpga_sim.lab.failures.rig import plural
@@ -111,7 +112,7 @@ def svg(knob: Knob, methods: Mapping[str, Sweep]) -> str:
         parts.append(_text(SHEETS[0], TOP - 14 + 15 * number, line, SOFT))
     for left, (caption, outcome) in zip(SHEETS, sheets):
         parts += _sheet(left, TOP + 26, f"at {caption} {unit}".rstrip(), outcome)
-    return style.for_dark_pages("\n".join([*parts, "</svg>"]) + "\n")
+    return style.for_dark_pages(writer.spelled("\n".join([*parts, "</svg>"]) + "\n"))
 
 
 SOFT = f'fill="{style.SOFT}"'

@@ -25,7 +25,6 @@ def save(found: Finger, title: str, path: Path) -> Path:
 
 
 def picture(found: Finger, title: str) -> Figure:
-    """Stages downward in order, then sums; times along."""
     bars = _bars(found)
     figure = style.new(0.36 * (len(bars) + 1) + 2.2)
     above, below = figure.subplots(2, 1, height_ratios=[len(bars) + 0.3, 2.6])

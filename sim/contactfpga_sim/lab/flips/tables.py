@@ -45,7 +45,6 @@ def compute() -> FlipResults:
 
 
 def draw(folder: Path, found: FlipResults) -> list[Path]:
-    """The picture, and all numbers as files beside the page."""
     numbers = folder.parent / "flips"
     campaign.write(found.rows, numbers / "flips.csv")
     summary.write(found.designs, numbers / "designs.csv")

@@ -34,7 +34,6 @@ NAMED = (
 
 
 def layouts_table() -> str:
-    """Arrangements on the page's link, and the best one."""
     found = compared(LINK, RING_M)
     rows = [["units", "a unit bears", "error of the place", "error of the force", "smallest force seen"]]
     rows += [_layout(one) for one in found if one.layout.name in NAMED]

@@ -12,7 +12,6 @@ from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
 
 
 def main() -> int:
-    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.lab.mutants", description=(__doc__ or ""))
     count, seconds = numbers.whole(1, 1_000_000, "mutants"), numbers.whole(1, 3600, "seconds")
     parser.add_argument("--each", type=count, default=EACH, help="mutants of each Skin (default %(default)s)")

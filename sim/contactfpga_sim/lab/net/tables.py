@@ -95,7 +95,6 @@ SHARES = {"half arrive (p50)": style.BLUE, "99 % arrive (p99)": style.VERMILLION
 
 
 def draw(folder: Path) -> Path:
-    """CPU time and latency over links, from :data:`WHOLE`."""
     import matplotlib
 
     with WHOLE.open(newline="", encoding="utf-8") as file:

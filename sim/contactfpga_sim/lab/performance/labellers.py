@@ -27,7 +27,6 @@ SEED = 20
 
 
 def labeller_table() -> str:
-    """Latency over touches and breaking shapes, and the bound."""
     place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
     lines = []
     for size in (16, 32, 64):

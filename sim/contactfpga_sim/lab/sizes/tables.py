@@ -42,7 +42,6 @@ WEIGHTS = (
 
 
 def gateware_table() -> str:
-    """The whole design and the labeller alone, by sheet and device."""
     head = ("design", "device", *(f"{lines}x{lines}" for lines in size.SIZES))
     rows = (
         (name, device.title, *(gateware_cell(name, device, lines) for lines in size.SIZES))
@@ -75,7 +74,6 @@ def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list
 
 
 def units_table() -> str:
-    """The reference Skin with pressure units and weighted sums."""
     reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
     rows = []
     for units, sums in ((1, 0), (3, 1), (6, 0), (6, 4), (8, 4)):

@@ -15,7 +15,7 @@ EXTRA = "haptics"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "file", metavar="FILE.json", help="Wrench, contacts or surface; docs/haptics.md has the format."
+        "file", metavar="FILE.json", help="The wrench, with contacts or a surface; docs/haptics.md has the format."
     )
     cones = "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices."
     parser.add_argument("--cones", action="store_true", help=cones)
