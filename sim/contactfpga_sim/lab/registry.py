@@ -65,7 +65,6 @@ class Study:
     """Needed programs, and paths with a slash."""
 
     def page_of(self, section: str) -> str:
-        """Page in ``docs`` with this section."""
         return self.sections[section].page or self.page
 
     def module(self, place: str) -> str:
@@ -74,7 +73,6 @@ class Study:
         return module if "/" in module else f"{__package__}.{self.name}.{module}"
 
     def function(self, place: str) -> Callable[..., Any]:
-        """The function at a place."""
         module, name = self.module(place), place.partition(":")[2]
         if "/" in module:
             file = Path(module).resolve()

@@ -69,7 +69,6 @@ class MixedTimes:
 
     @property
     def worst(self) -> float:
-        """The largest time."""
         return float(self.high.max())
 
     def spread(self) -> Spread:

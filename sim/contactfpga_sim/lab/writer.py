@@ -24,12 +24,10 @@ class PageSection(NamedTuple):
 
 
 def sections(page: str) -> dict[str, PageSection]:
-    """Sections of a page's text, by name."""
     return {name: PageSection(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
 
 
 def line(cells: Iterable[str]) -> str:
-    """A line of a table."""
     return f"| {' | '.join(cells)} |"
 
 

@@ -98,7 +98,6 @@ class Graph:
         self._known: dict[tuple[int, int], int] = {}
 
     def variable(self) -> int:
-        """Literal of a new variable."""
         self.operands.append(None)
         return 2 * (len(self.operands) - 1)
 

@@ -134,7 +134,6 @@ def study() -> dict[Geometry, list[Batch]]:
 
 
 def mean_n(halves: Sequence[Peaks]) -> float:
-    """Mean peak force in N."""
     return float(np.concatenate([half.force_n for half in halves]).mean())
 
 

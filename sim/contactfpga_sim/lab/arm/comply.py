@@ -30,7 +30,6 @@ class Push:
 
 
 def pushed(case: Case, speed_m_s: float) -> tuple[Push, RunRecord]:
-    """Run the case's push at another speed."""
     if case.control.behavior != "comply":
         raise CaseError(f"behavior is {case.control.behavior!r}; a push needs 'comply'")
     touch = dataclasses.replace(case.touch[0], push_m_s=speed_m_s)

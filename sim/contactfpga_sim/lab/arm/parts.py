@@ -58,7 +58,6 @@ class Motor(_Checked):
 
     @property
     def torque_nm_a(self) -> float:
-        """Torque at the joint per ampere."""
         return self.gear * self.torque_constant
 
     @property

@@ -42,7 +42,6 @@ def pictures(found: dict[str, RunRecord], folder: Path, suffixes: tuple[str, ...
 
 
 def course(found: dict[str, RunRecord], field: str, label: str) -> Figure:
-    """A quantity over time, around the contact."""
     figure = style.new(3.9)
     place = figure.subplots()
     for look, (name, result) in zip(LOOKS, found.items()):

@@ -47,7 +47,6 @@ def least_mm(task: Task) -> Interval | None:
 
 
 def bounded(points: Sequence[Point], executor: Executor) -> list[Point]:
-    """The points with :func:`least_mm` filled in."""
     least = executor.map(least_mm, [point.task for point in points])
     return [dataclasses.replace(point, least_mm=value) for point, value in zip(points, least, strict=True)]
 

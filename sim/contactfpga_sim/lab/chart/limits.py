@@ -39,7 +39,6 @@ TOUCHES = 300
 
 
 def floor_table() -> str:
-    """The floor by contact, cover and pitch."""
     head = (
         "contact",
         "cover",

@@ -27,7 +27,6 @@ FIELDS = (
 
 
 def command(point: Point) -> str:
-    """Command that computes this point alone."""
     task = point.task
     return (
         f'contactfpga study chart --method "{task.method}" --family {task.family} --placements {task.count} '

@@ -95,7 +95,6 @@ class Speed:
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
-    """Cycle of a touch after ``share`` of a scan."""
     scan = skin.derived.frame_clocks
     return int((math.ceil(WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
 

@@ -25,7 +25,6 @@ def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> 
 
 
 def clocks_table() -> str:
-    """Time of the last record over all last rows, and bounds."""
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
     bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))

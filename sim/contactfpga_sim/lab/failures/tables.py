@@ -19,7 +19,6 @@ HEAD = (
 
 
 def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    """A row per knob and method."""
     return writer.table(HEAD, [line for name, methods in sweeps.items() for line in rows(KNOBS[name], methods)])
 
 

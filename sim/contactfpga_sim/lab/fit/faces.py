@@ -42,7 +42,6 @@ def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cov
 
 
 def own(cover: Cover) -> Faces:
-    """One cover for every sheet."""
     return {"the file's": lambda pitch_mm: cover}
 
 

@@ -29,5 +29,4 @@ def section(arguments: str) -> str:
 
 
 def fingers_section() -> str:
-    """Fingertips, with all covers and closing forces."""
     return section("examples/scenes-fingers.toml")

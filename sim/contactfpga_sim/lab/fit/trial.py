@@ -160,7 +160,6 @@ class Trial:
 
     @property
     def wires(self) -> int:
-        """Lines of the sheet."""
         return self.skin.rows + self.skin.columns
 
     @property

@@ -123,7 +123,6 @@ def _reference(design: str) -> Reference:
 
 
 def write(rows: Iterable[Row], path: Path) -> None:
-    """Write a line per flip."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(("design", *FlipOutcome._fields))
@@ -133,7 +132,6 @@ def write(rows: Iterable[Row], path: Path) -> None:
 
 
 def read(path: Path) -> list[Row]:
-    """Read what :func:`write` wrote."""
     with path.open(encoding="utf-8", newline="") as file:
         return [_row(line) for line in csv.DictReader(file)]
 

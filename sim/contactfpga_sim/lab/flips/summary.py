@@ -51,13 +51,11 @@ def measured(names: Iterable[str]) -> list[Design]:
 
 
 def write(found: Iterable[Design], path: Path) -> None:
-    """Write a line per design."""
     with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([Design._fields, *found])
 
 
 def read(path: Path) -> list[Design]:
-    """Read what :func:`write` wrote."""
     with path.open(encoding="utf-8", newline="") as file:
         return [
             Design(line.pop("name"), **{key: int(value) for key, value in line.items()})
@@ -66,7 +64,6 @@ def read(path: Path) -> list[Design]:
 
 
 def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
-    """Flips of a design's registers, or of its memories."""
     return [row for row in rows if row.design == design and row.found.memory == memory]
 
 

@@ -152,7 +152,6 @@ def _friction(kind: str, drag: float, rng: Random, count: int) -> list[Outcome]:
 
 
 def holds(contact: Contact, push_n: float) -> bool:
-    """Whether the stated interval holds the push."""
     least, largest = contact.interval_n or (math.inf, None)
     return least <= push_n and (largest is None or push_n <= largest)
 

@@ -89,7 +89,6 @@ class Pressed:
 
 
 def locator(case: CoverageCase) -> Locator:
-    """Locator under the case's assumptions."""
     sheet = Sheet(
         rows=LINES,
         columns=LINES,

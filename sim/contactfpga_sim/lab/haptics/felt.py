@@ -123,7 +123,6 @@ class FrameArrival:
 
 
 def heard(touching: Touching, until_s: float) -> list[FrameArrival]:
-    """All frames until ``until_s``."""
     found: list[FrameArrival] = []
     open_ones: list[FrameArrival] = []
     with contactfpga.open(touching.board(), touching.setting.skin) as board:

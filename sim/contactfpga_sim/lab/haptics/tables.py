@@ -105,7 +105,6 @@ def interval(errors: np.ndarray) -> tuple[float, float, float]:
 
 
 def felt_table() -> str:
-    """Errors of the place over time, by setting and method."""
     rows = [["sheet", "method", *(f"{1e3 * one:g} ms" for one in SHOWN_S)]]
     for setting in SETTINGS:
         for method, errors in found(setting).items():

@@ -31,7 +31,6 @@ def diodes_table() -> str:
 
 
 def pulls_table() -> str:
-    """Times and currents by column pull-up."""
     rows = [
         ["pull-up", "`release_us` without precharge", "`settle_us`", "row's pin, all columns pressed", "left to VIL"]
     ]
@@ -46,7 +45,6 @@ def pulls_table() -> str:
 
 
 def series_table() -> str:
-    """Effect of pin resistors on shorts, pulses and times."""
     rows = [["resistor at each pin", "two pins shorted to each other", "pulses while lines charge", "`settle_us`"]]
     rows[0].append("left to VIL")
     for ohm in SERIES_OHM:

@@ -79,7 +79,6 @@ def meet(angle: float) -> list[Met]:
 
 
 def peaks_table() -> str:
-    """Peak forces for docs/mujoco.md."""
     rng = np.random.default_rng(0)
     found = [meet(NEAR_RAD + rng.uniform(0, SPREAD_RAD)) for _ in range(MEETINGS)]
     late_ms, peak_n = (
@@ -107,7 +106,6 @@ def draw(folder: Path) -> Path:
 
 
 def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
-    """Play the view frame by frame."""
     from PIL import Image
 
     robots = shown.source

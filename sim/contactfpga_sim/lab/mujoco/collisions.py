@@ -278,7 +278,6 @@ def compare(collisions: int = 200, free_runs: int = 100) -> Compared:
 
 
 def observer_table() -> str:
-    """Observer table for docs/collisions.md."""
     found = compare()
     count = len(found.sheet)
     head = ["", "sheet", "observer", "neither"]

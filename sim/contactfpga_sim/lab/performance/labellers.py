@@ -48,7 +48,6 @@ def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
 
 
 def recordings_table() -> str:
-    """:func:`recorded_table` of the project's recordings."""
     return recorded_table(scans.recordings())
 
 

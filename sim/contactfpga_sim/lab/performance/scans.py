@@ -108,7 +108,6 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
 
 
 def reference_table() -> str:
-    """Latency, rate and bytes by setting."""
     head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames per second", "bytes, one zone")
     return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
 
@@ -122,7 +121,6 @@ def reference_row(name: str, skin: Skin) -> str:
 
 
 def report_table() -> str:
-    """Bytes saved by on-board division, and its cost."""
     head = ("sheet", "report", "bytes per zone", "first row", "last row", "every other switch of the last row")
     names = ("reference", "32x32", "64x64")
     return writer.table(

@@ -76,7 +76,6 @@ def loop_table() -> str:
 
 
 def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
-    """Many links in one process."""
     rows = [["links of 1 kHz", "each 10 ms", "reader", "of a core", "frames that came in time", "age"]]
     for count, call in asked:
         for reader in READERS:

@@ -47,7 +47,6 @@ def sizes_table() -> str:
 
 
 def reading_table() -> str:
-    """Reading speed on this machine."""
     with compute.folder() as place:
         compute.cost(stream(10_000), SECONDS[10_000], place / "x.mcap", False)
         found = compute.reading(place / "x.mcap", place / "x.parquet")

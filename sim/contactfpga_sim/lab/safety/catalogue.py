@@ -47,7 +47,6 @@ class SheetFault:
     contact_connected: bool = True
 
     def middle(self, rows: int, columns: int) -> Cell:
-        """A cell of the fault."""
         for row, column in (*self.closed, *self.dead, *self.bare, *self.rows.items()):
             return row, min(column, columns - 1)
         for column, row in self.columns.items():

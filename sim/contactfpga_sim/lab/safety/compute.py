@@ -55,12 +55,10 @@ class Place:
 
 
 def places(skin: Skin, fault: str) -> Iterator[tuple[str, SheetFault]]:
-    """Places of a fault on a sheet."""
     yield from FAULTS[fault].places(skin).items()
 
 
 def at(skin: Skin, hurt: SheetFault, name: str = "", phase: float = PHASES[0]) -> Place:
-    """Results of a fault at a place."""
     return Place(
         name, {scene: trial.run(skin, hurt, touched, phase) for scene, touched in trial.scenes(skin, hurt).items()}
     )

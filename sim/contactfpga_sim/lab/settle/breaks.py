@@ -21,7 +21,6 @@ US = 1e6
 
 @functools.cache
 def sweeps(name: str) -> dict[str, Sweep]:
-    """Outcomes of every run of a knob."""
     return KNOBS[name].sweep()
 
 

@@ -142,7 +142,6 @@ def agreement_table() -> str:
 
 
 def summary_table() -> str:
-    """Largest difference of each phase."""
     rows = [["phase", "circuits", "largest difference"]]
     for name in agreement.PHASES:
         errors = [abs(one.error) for one in compared() if one.case.phase.name == name]

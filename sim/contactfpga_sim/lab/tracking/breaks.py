@@ -81,7 +81,6 @@ class Knob:
 
 
 def holds(rate: rated.Rate) -> bool:
-    """Whether enough are correct."""
     return bool(rate.reaches(rated.LEVEL))
 
 
@@ -105,7 +104,6 @@ def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
 
 
 def sweeps() -> dict[str, dict[str, Rates]]:
-    """Sweeps of every knob."""
     with pool.executor() as workers, pool.progress() as step:
         for one in [workers.submit(sweep, name) for name in KNOBS]:
             one.result()

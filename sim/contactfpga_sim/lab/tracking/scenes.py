@@ -40,7 +40,6 @@ class Finger:
     bounces: bool = False
 
     def there(self, seconds: float) -> bool:
-        """Whether it touches the sheet."""
         return self.begins_s <= seconds < self.ends_s
 
     def cells(self, seconds: float, skin: Skin) -> np.ndarray:
@@ -216,7 +215,6 @@ def zones_of(cells: np.ndarray, time_us: int, skin: Skin = SKIN) -> tuple[Zones,
 
 
 def played(fingers: Played, rate_hz: float, skin: Skin = SKIN, seconds: float = SECONDS) -> Iterator[FrameTruth]:
-    """Frames of a scene."""
     for number in range(int(seconds * rate_hz)):
         now = number / rate_hz
         yield shown(fingers, now, skin)

@@ -234,7 +234,6 @@ MOST = 1500
 
 
 def skin_of(recording: Recording) -> Skin:
-    """A Skin of the recording's size."""
     pitch = recording.pitch_mm or Skin().pitch_x_mm
     _, rows, columns = recording.pressed.shape
     return Skin(rows=rows, columns=columns, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=100.0)
@@ -347,7 +346,6 @@ def ahead(ours: Score, other: Score) -> tuple[float, float]:
 
 @functools.cache
 def of_recording(path: Path, every: int) -> Scores:
-    """Scores on stretches of a recording."""
     stretches = histories(path, every)
     return {
         tracker: score([followed(make(), stretch, JUDGED_HZ) for stretch in stretches])
@@ -356,7 +354,6 @@ def of_recording(path: Path, every: int) -> Scores:
 
 
 def all_scenes() -> dict[tuple[str, float], Scores]:
-    """Scores by family and rate."""
     keys = list(itertools.product(scenes.FAMILIES, RATES_HZ))
     with pool.executor() as workers, pool.progress() as step:
         for one in [workers.submit(of_family, *key) for key in keys]:

@@ -11,7 +11,6 @@ COUNTS = 1, 3, 6, 8
 
 
 def units_table() -> str:
-    """Sweep times by supply and units."""
     head = (
         "converter",
         "units",

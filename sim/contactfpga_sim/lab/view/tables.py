@@ -170,7 +170,6 @@ class ProcessorLoad:
 
 
 def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> ProcessorLoad:
-    """CPU load under these fingers."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
     spent, read = [0.0], virtual.read
@@ -194,7 +193,6 @@ def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: 
 
 
 def load_table(shown: ServedView) -> str:
-    """Load with and without touches."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
         load = load_of(shown, fingers)

@@ -222,7 +222,6 @@ def library_of(skin: Skin) -> Library:
 
 
 def carried_key(skin: Skin) -> str:
-    """Key of the WebAssembly board."""
     return webassembly.board_key(webassembly.gateware_of(skin), _DRIVER, _defines(skin))
 
 

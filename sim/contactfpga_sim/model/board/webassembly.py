@@ -156,24 +156,20 @@ def _compiled(file: Path) -> tuple[Any, Any]:
 
 
 def listed() -> dict[str, Any]:
-    """The content of :data:`LIST`."""
     found: dict[str, Any] = json.loads(LIST.read_text(encoding="utf-8"))
     return found
 
 
 def write_list(files: Mapping[str, Mapping[str, str]]) -> None:
-    """Write :data:`LIST`."""
     found = {name: {**keys, "sha256": sum_of(path_of(name).read_bytes())} for name, keys in files.items()}
     LIST.write_text(json.dumps({"tools": tools(), "files": found}, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def path_of(name: str) -> Path:
-    """Path of a packaged file."""
     return FOLDER / f"{name}.wasm"
 
 
 def file(key: str) -> Path | None:
-    """The packaged file with this key, if any."""
     for name, made in listed()["files"].items():
         if made["key"] == key and (path := path_of(name)).is_file():
             if sum_of(path.read_bytes()) == made["sha256"]:
@@ -224,5 +220,4 @@ def build_c(source: Path, folder: Path) -> bytes:
 
 
 def sum_of(data: bytes) -> str:
-    """Hash in hex digits."""
     return hashlib.sha256(data).hexdigest()

@@ -345,5 +345,4 @@ def bits(largest: int) -> int:
 
 @functools.lru_cache(maxsize=64)
 def facts(skin: Skin) -> Facts:
-    """Facts of a Skin, cached."""
     return Facts(skin)

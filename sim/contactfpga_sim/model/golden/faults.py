@@ -26,7 +26,6 @@ class FaultHistory:
         self._words.append(word)
 
     def at(self, cycle: int) -> int:
-        """Word in a cycle."""
         return self._words[bisect.bisect_right(self._cycles, cycle) - 1]
 
     def between(self, first: int, last: int) -> list[tuple[int, int, int]]:

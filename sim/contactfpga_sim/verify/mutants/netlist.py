@@ -154,7 +154,6 @@ def module_of(name: str) -> str:
 
 
 def in_sheet(name: str) -> str:
-    """A name without its sheet."""
     return re.sub(r"^sheet_\d+\.", "", name)
 
 

@@ -7,7 +7,6 @@ _RAM_BYTES, _WORDS_AN_INITVAL = 2048, 16
 
 
 def cells() -> str:
-    """Text of all cells."""
     return _block_ram() + _PIN + _GLOBAL_RESET + _pll()
 
 

@@ -49,7 +49,6 @@ class Unrolling:
         self.rest = next((at for name, at in zip(placed.outputs, placed.driven) if name == f"{REST}[0]"), 0)
 
     def assume(self, literal: int) -> None:
-        """Assume that the literal holds."""
         self._define()
         if literal != 1:
             self._solver.add_clause([_signed(literal)] if literal else [])

@@ -40,7 +40,6 @@ class Inside:
         return self._only(self._all_driven(name), "drives", name)
 
     def part(self, path: str):
-        """Component of that path."""
         return self._part(path).origins[0]
 
     def word(self, path: str, address) -> Signal:

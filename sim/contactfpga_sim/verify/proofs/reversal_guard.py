@@ -44,7 +44,6 @@ def pins(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(sheet: Sheet) -> None:
-    """Lemmas: a state affects the sheet a clock later."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived, rows = sheet.dut.derived, sheet.skin.rows
     before, started = proof.before(state, init=LISTEN), proof.before(1)

@@ -85,7 +85,6 @@ def one_line(proof: Proof, **changes: Any) -> None:
 
 
 def pin_lemmas(tested: Tested) -> None:
-    """Lemmas: a state affects the sheet a clock later."""
     proof, sheet, inside = tested.proof, tested.sheet, tested.sheet.inside
     skin, derived, state, clock = sheet.skin, sheet.dut.derived, sheet.state, sheet.clock
     slot, slot_clock, before = inside["test.slot_state"], inside["test.clock"], proof.before(state, init=LISTEN)

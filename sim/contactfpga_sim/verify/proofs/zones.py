@@ -39,7 +39,6 @@ class OpenRow:
         return [mine.eq(Mux(when, theirs, 0)) for mine, theirs in zip(self.state(), other.state(), strict=True)]
 
     def state(self) -> list:
-        """All state."""
         return [self.cells, *self.reach, *(moments.as_value() for moments in self.moments)]
 
     def record(self, x: int) -> Value:
