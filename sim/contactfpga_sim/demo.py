@@ -157,7 +157,6 @@ LEGEND = (
     'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
     "the median and the worst of touches at any instant of a scan.",
 )
-"""Explanation of the table."""
 
 TITLE = (
     "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud; "

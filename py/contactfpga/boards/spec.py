@@ -1,8 +1,8 @@
 """Description of a board, without Amaranth.
 
-Sheet lines are on two sides of header pins. Rows use the first side from its start, columns the second; lines that do
-not fit continue at the far end of the other side. So row k and column k are on the same pin for every sheet. A few
-wires of shift registers replace the lines.
+Rows use one side of the header pins from its start, columns the other; lines that do not fit continue at the far end of
+the other side. So row k and column k are on the same pin for every sheet. A few wires of shift registers replace the
+lines.
 """
 
 from __future__ import annotations

@@ -205,12 +205,11 @@ class _Point(NamedTuple):
 
 
 class ClockFit:
-    """A running fit of the board's clock to the host's since one power-up: device and host times in, lines between the
-    clocks out.
+    """A running fit of the board's clock to the host's since one power-up.
 
-    Delays only add. A frame arrives after its sampling, so the least delayed arrivals, less the wire time of their
-    bytes, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
-    which bounds it from below. The true line lies between, with the slope of a crystal.
+    Delays only add, so the least delayed arrivals, less the wire time of their bytes, bound the host's clock from
+    above. A frame that answers a request was sampled after the request was sent, which bounds it from below. The true
+    line lies between, with the slope of a crystal.
 
     Sums are formed in order and exponentials one by one, so that the same fit in C (c/clockfit.h) rounds alike.
     """

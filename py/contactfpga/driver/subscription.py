@@ -250,7 +250,7 @@ def frame_of(found: object) -> Zones:
 
 
 def checked_item(found: object) -> object:
-    """The awaited item; raises the error that came in its place."""
+    """As :func:`frame_of`, for any item."""
     if isinstance(found, ContactFPGAError):
         raise found
     return found

@@ -1,4 +1,4 @@
-"""Long tables of pages: a page keeps the rows and columns that matter, a CSV file has all."""
+"""Long tables: a page has the rows and columns that matter, a CSV file all."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _PARTED = re.compile(
 
 
 def part(text: str, kept: str, file: Path, heads: str = "") -> str:
-    """A section with the rows of its longest table that match the regular expression ``kept``, and a link to the
-    file with all; only the link if none matches. ``heads`` matches the headers to keep."""
+    """A section with a link to the file, and of its longest table the rows that match the regular expression ``kept``,
+    if any, with the headers that match ``heads``."""
     table = max(_TABLE.findall(text), key=len).rstrip("\n")
     lines = table.splitlines()
     rows = lines[_HEAD:]

@@ -1,4 +1,4 @@
-"""Covers of switches in the studies, of parts that one can buy or cut; nothing was built."""
+"""The studies' covers, of parts that one can buy or cut; none was built."""
 
 from __future__ import annotations
 

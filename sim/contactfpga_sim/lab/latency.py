@@ -1,4 +1,4 @@
-"""Times from a touch of a resting sheet to the last byte and the contact pin, on compiled gateware."""
+"""Times from a touch of a resting sheet to last byte and contact pin, in the gateware."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Entries of studies. Each study has a folder beside this file, unless scripts make all of it, and an entry in
-``studies.py``.
+"""Entries of studies, in ``studies.py``; a study's folder is beside this file, unless scripts make all of it.
 
 An entry names functions as ``module:function`` of its folder, or ``folder/file.py:function`` of the project's, so that
 reading it imports nothing.

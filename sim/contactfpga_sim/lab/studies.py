@@ -541,4 +541,3 @@ _ALL = (
     ),
 )
 STUDIES = {study.name: study for study in _ALL}
-"""Studies by name."""

@@ -1,15 +1,15 @@
 """The USB serial chip between UART and host: when bytes are delivered.
 
-By FTDI's AN232B-04, "Data Throughput, Latency and Handshaking": A packet is closed when it is full, and at the event
-character unless that is its first byte. The latency timer of 1 to 255 ms, by default 16 ms, runs from the last sent
-packet. When it ends, the open packet is sent, even if empty.
+By FTDI's AN232B-04: A packet is closed when it is full, and at the event character unless that is its first byte. The
+latency timer of 1 to 255 ms, by default 16 ms, runs from the last sent packet. When it ends, the open packet is sent,
+even if empty.
 
 By the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and a
 packet's time on the bus (tables 5-9 and 5-10).
 
-Assumed, not documented: the host asks once at the start of each frame or microframe, and the chip sends all closed
-packets in order. Real controllers ask again within a frame, so bytes may be up to one frame earlier. The timer counts
-frames. The bus is otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
+Assumed: the host asks once at the start of each frame or microframe, and the chip sends all closed packets in order.
+Real controllers ask again within a frame, so bytes may be up to one frame earlier. The timer counts frames. The bus is
+otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A Skin's gateware as Verilog for another design, with assertions, testbench, vectors and example."""
+"""A Skin's gateware as Verilog for another design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A touch as a waveform: every signal of the gateware until the frame is sent."""
+"""A touch as a waveform of every signal."""
 
 from __future__ import annotations
 

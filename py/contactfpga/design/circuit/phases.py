@@ -1,4 +1,4 @@
-"""The steps of a scan on the sheet, and when the lines that are read have settled."""
+"""The steps of a scan on the sheet, and when their lines have settled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A resting sheet: levels and pin currents of the worst patterns, and designs that cannot work."""
+"""A resting sheet: worst levels and pin currents, and designs that cannot work."""
 
 from __future__ import annotations
 

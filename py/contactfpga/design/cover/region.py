@@ -1,8 +1,8 @@
 """A body region that the arm runs into: speed and reaction time that keep its limits.
 
-The user fills in a table of regions; none of the numbers is ours. The quantities are those of ISO/TS 15066:2016, annex
-A, and ISO 10218-2:2025: effective mass and spring constant, and largest force and pressure in a transient contact, from
-which the region can recoil, and in a quasi-static one, where it is clamped.
+The user's table of regions, of which no number is ours, has the quantities of ISO/TS 15066:2016, annex A, and ISO
+10218-2:2025: effective mass, spring constant, and largest force and pressure in a transient contact, from which the
+region can recoil, and in a quasi-static one, where it is clamped.
 
 The foam, F = K_s delta^1.5 (Hertz), is in series with the region's spring, F = k y. Both are pressed by x(F) =
 (F/K_s)^(2/3) + F/k, and store W(F) = 2/5 F (F/K_s)^(2/3) + F^2/(2 k).

@@ -1,8 +1,7 @@
 """From a wrench and touched places to contacts, by the simplest sufficient model.
 
-One contact has a closed form, two the range of squeezes within friction's cones. Both are plain Python, faster than
-numpy for a few numbers, and correct the wrench to the nearest that contacts at these places can exert: a force has no
-moment about its point, two have none about their line.
+One and two contacts are solved in plain Python, faster than numpy for a few numbers. The wrench is corrected to the
+nearest that they can exert: a force has no moment about its point, two have none about their line.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`contactfpga board`: the virtual board on a pseudo-terminal."""
+"""The command `contactfpga board`."""
 
 from __future__ import annotations
 

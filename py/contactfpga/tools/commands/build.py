@@ -1,4 +1,4 @@
-"""`contactfpga build`: a bitstream for a board, its resources, and the sheet's wiring."""
+"""The command `contactfpga build`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga doctor`: checks the path from this computer to the board, with remedies."""
+"""The command `contactfpga doctor`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga export`: a recording as a table for other programs."""
+"""The command `contactfpga export`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga fit`: the cheapest Skin that is good enough for given scenes."""
+"""The command `contactfpga fit`."""
 
 from __future__ import annotations
 

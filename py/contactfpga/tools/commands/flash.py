@@ -1,4 +1,4 @@
-"""`contactfpga flash`: passes a bitstream to the board's programmer."""
+"""The command `contactfpga flash`."""
 
 from __future__ import annotations
 

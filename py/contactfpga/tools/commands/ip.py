@@ -1,4 +1,4 @@
-"""`contactfpga ip`: a Skin's gateware as Verilog for another design."""
+"""The command `contactfpga ip`."""
 
 from __future__ import annotations
 

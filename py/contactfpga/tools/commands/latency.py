@@ -1,4 +1,4 @@
-"""`contactfpga latency`: from a touch to the contact pin, to the last byte, through USB, and to user code."""
+"""The command `contactfpga latency`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga plot`: a recording in one picture."""
+"""The command `contactfpga plot`."""
 
 from __future__ import annotations
 

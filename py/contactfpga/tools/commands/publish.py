@@ -1,4 +1,4 @@
-"""`contactfpga publish`: a board's bytes for other programs and machines."""
+"""The command `contactfpga publish`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga record`: a board's data into a file; and recovery of an unclosed file."""
+"""The command `contactfpga record`."""
 
 from __future__ import annotations
 

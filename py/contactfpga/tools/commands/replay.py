@@ -1,4 +1,4 @@
-"""`contactfpga replay`: recorded frames through the compiled gateware."""
+"""The command `contactfpga replay`."""
 
 from __future__ import annotations
 

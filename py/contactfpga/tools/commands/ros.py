@@ -1,4 +1,4 @@
-"""`contactfpga ros`: the skin's data as ROS 2 topics, without an installation of ROS."""
+"""The command `contactfpga ros`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga settle`: times that a sheet's circuit needs, and whether it can work."""
+"""The command `contactfpga settle`."""
 
 from __future__ import annotations
 

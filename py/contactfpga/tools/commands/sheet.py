@@ -1,4 +1,4 @@
-"""`contactfpga sheet`: the sheet of a Skin as files to order, and the circuit of its lines."""
+"""The command `contactfpga sheet`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga view`: the sheet in the browser, live or from a recording."""
+"""The command `contactfpga view`."""
 
 from __future__ import annotations
 

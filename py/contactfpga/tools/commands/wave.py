@@ -1,4 +1,4 @@
-"""`contactfpga wave`: a touch as a waveform of the gateware."""
+"""The command `contactfpga wave`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga zones`: the contact zones, live, as a table beside the drawn sheet, or as JSON."""
+"""The command `contactfpga zones`."""
 
 from __future__ import annotations
 

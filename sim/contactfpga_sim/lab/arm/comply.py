@@ -1,4 +1,4 @@
-"""Active compliance: how far the arm yields to a push, and how fast it may be pushed."""
+"""Active compliance: how far, and how fast at most, the arm yields to a push."""
 
 from __future__ import annotations
 

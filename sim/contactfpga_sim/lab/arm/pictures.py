@@ -1,4 +1,4 @@
-"""Pictures of a run (the paper's Figs. 6 and 7), and charts of force and thickness over latency."""
+"""The paper's Figs. 6 and 7 of a run, and charts of force and thickness over latency."""
 
 from __future__ import annotations
 

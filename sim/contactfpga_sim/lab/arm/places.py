@@ -1,7 +1,7 @@
 """Touches anywhere on the sheet.
 
-Places fill pitch cells in the sheet's middle evenly; each has an instant between controller samples and a latency
-measured through the gateware.
+Places fill pitch cells in the sheet's middle evenly; each has a measured latency and an instant between controller
+samples.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def run(
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
     default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak after
-    the reaction. The first run of a Skin by ``pin``, ``uart``, ``force`` or ``both`` compiles its gateware.
+    the reaction. All ways but ``latency`` and ``torque`` compile the Skin's gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")

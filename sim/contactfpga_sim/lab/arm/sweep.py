@@ -1,4 +1,4 @@
-"""Points of the charts: many short runs for any executor."""
+"""Points of the charts, by any executor."""
 
 from __future__ import annotations
 
@@ -142,7 +142,6 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
 
 
 def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency, which reaches the limit at the reaction; unsafe, as the arm still
-    presses on."""
+    """(delta(limit) - delta(closing)) / latency; unsafe, as the arm presses on after the reaction."""
     depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
     return max(0.0, depth[0] - depth[1]) / latency

@@ -1,4 +1,4 @@
-"""Points of the chart: every method on every family, for any executor."""
+"""Points of the chart: every method on every family."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def study(
     """Work out all tasks; ``step(kind of work, pieces of that kind)`` follows each piece. A point enters ``so_far``
     once its errors and times are known, before its size.
 
-    Results are cached by code. ``executor`` is a process pool's or alike, such as Dask's.
+    Results are cached by code. ``executor`` can be Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
     parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {

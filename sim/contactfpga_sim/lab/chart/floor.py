@@ -1,9 +1,9 @@
 """The least mean barycenter error of any method that sees only closed cells.
 
 Each scene has one contact away from the edge. Scenes with the same cells, up to moves, mirrors and turns, are
-indistinguishable: the best estimate is their geometric median, and its mean distance is the floor. A median judged on
-its own scenes is optimistic, a lower bound; one judged on other scenes is a usable method, an upper bound. Methods know
-the spread of closing forces, not each switch's own.
+indistinguishable: the best estimate is their geometric median, and its mean distance is the floor. Judged on its own
+scenes a median gives a lower bound, on others, as a usable method, an upper one. Methods know the spread of closing
+forces, not each switch's own.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The README's picture: covers, pitches and closing forces.
 
-The family `fingers` has two to five fingertips anywhere on 160 mm by 160 mm. Labellers, reports and rates that change
-little are in the table.
+Labellers, reports and rates that change little are only in the table.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Models of other sensors under the same mechanics. No device was measured: readings of analog elements,
-microcontroller times and part costs are assumptions."""
+"""Models of other sensors under the same mechanics. Analog readings, microcontroller times and part costs are assumed,
+not measured."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ HALVINGS = 14
 BITS = 8
 FULL_N = 10.0
 NOISE_COUNTS = 1.0
-"""Noise in converter steps."""
 CROSSTALK = 0.01
 """Share of a force read by each of four neighbors."""
 GAIN_SPREAD = 0.05

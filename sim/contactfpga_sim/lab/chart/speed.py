@@ -1,5 +1,4 @@
-"""Times by the golden model, a sample also by the gateware: from a touch to its complete frame's last byte; frame
-time and rate of a constant scene."""
+"""Times by the golden model, a sample also by the gateware: of a touch and of a constant scene's frame."""
 
 from __future__ import annotations
 
@@ -77,7 +76,6 @@ STEADY = 12
 MOST_SCANS = 4000
 
 GOLDEN = 0.6180339887498949
-"""Golden ratio, whose multiples sample a scan evenly."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Speed against accuracy of the cover's formulas, with rules that fail. Times are of this machine."""
+"""Speed on this machine and accuracy of the cover's formulas, with rules that fail."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
-"""A knob as a picture: the share of right draws by value, and the sheet before and at the first break.
-
-Hand-written SVG: equal numbers make equal files.
-"""
+"""A knob as SVG: the share of right draws by value, and the sheet before and at the first break; equal numbers make
+equal files."""
 
 from __future__ import annotations
 

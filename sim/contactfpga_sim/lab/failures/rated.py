@@ -74,8 +74,8 @@ class Rated:
 
 
 def _together(found: Sequence[Outcome], rate: Rate, holds: bool, telling: float) -> Outcome:
-    """One outcome of all draws, with the reports of half the draws if the value holds, else of a share ``telling``
-    of wrong ones."""
+    """One outcome of all draws, with the reports of half the draws if the value holds, else of a share ``telling`` of
+    wrong ones."""
     wrong = [one for one in found if not one.right]
     each = [{re.sub(r"\d+", "N", word) for word in one.told} for one in (found if holds else wrong)]
     told = set().union(*each) if holds or sum(map(bool, each)) >= telling * len(each) else set()

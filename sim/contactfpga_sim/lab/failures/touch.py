@@ -1,8 +1,4 @@
-"""Knobs of touch.
-
-Fingers press a bare sheet, whose switches close under a contact's middle whatever its force, and the starter kit's
-covered sheet.
-"""
+"""Knobs of touch, on a bare sheet and on the starter kit's covered one."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The host's share of a touch, measured: the driver reads a board on a pseudo-terminal.
 
-A second process is board and USB bridge: it runs the compiled gateware, answers requests, and writes each packet when
-the bridge would. Writing to the pseudo-terminal stands for the USB controller's interrupt and the kernel's driver.
+A second process runs the compiled gateware and writes each packet when the USB bridge would. Writing stands for the USB
+controller's interrupt and the kernel's driver.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The stages from a touch to user code: exact ones, and one measured on this machine."""
+"""The stages from a touch to user code; all but the host's are exact."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Sequential test: a Skin that surely misses a limit is dropped, one that surely meets all is kept.
 
 Ends of confidence intervals decide after each batch of scenes; each side errs with at most 2.5 %, shared by all looks.
-Shares have Chernoff's interval, valid for any values from 0 to 1 and any count; other errors the normal one.
+Shares have Chernoff's interval, valid for any count; other errors the normal one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The search: sheets with the fewest wires first; errors and times, then the size of good ones."""
+"""The search: sheets with the fewest wires first; size is computed for good ones alone."""
 
 from __future__ import annotations
 

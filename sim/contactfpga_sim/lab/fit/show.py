@@ -56,8 +56,8 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
 
 
 def _told(fit: Fit) -> list[tuple[Trial, int]]:
-    """Refused trials to show, each with the number it represents: one per other cover on the answer's sheet and per
-    sheet with fewer wires, up to :data:`SHEETS`; without an answer one per sheet."""
+    """Refused trials for :func:`rows`, each with the number it represents; at most :data:`SHEETS` of other sheets than
+    the answer's."""
     groups: dict[object, list[Trial]] = {}
     for one in fit.cheaper:
         skin, answer = one.skin, fit.answer

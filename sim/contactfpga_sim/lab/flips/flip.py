@@ -1,4 +1,4 @@
-"""One flip, followed until it is gone or half a second is over."""
+"""One flip, followed until its end, at most half a second."""
 
 from __future__ import annotations
 

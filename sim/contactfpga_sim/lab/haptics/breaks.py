@@ -1,7 +1,7 @@
 """Limits of force joined to location: each sweep violates one assumption more and more.
 
-Each value is tried with random contacts until it is clear whether the stated 95 % hold for 90 % of them. A failure
-counts as reported if half of the failing ones are.
+Each value is tried with random contacts until it is clear whether the stated 95 % hold for 90 % of them. A value that
+fails counts as reported if half of its failures are.
 """
 
 from __future__ import annotations

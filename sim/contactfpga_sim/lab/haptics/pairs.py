@@ -1,7 +1,6 @@
-"""Limits of two fingers' pushes by geometry: their uncertain places along the line through both.
+"""Limits of two fingers' pushes by their uncertain places along the line through both.
 
-Three units on a plane measure the sum of the pushes and two moments. Each finger is a disc that closes the switches
-under it.
+Three units on a plane measure the push and two moments. A finger is a disc that closes the switches under it.
 """
 
 from __future__ import annotations

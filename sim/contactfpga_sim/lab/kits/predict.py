@@ -1,7 +1,7 @@
 """Predictions of a kit with 95 % intervals.
 
-Gateware and bridge times are exact up to the crystal and the choice of touches. Circuit and cover are computed for
-draws of assumed tolerances (:func:`drawn_circuit`, :func:`drawn_cover`), from 2.5 to 97.5 %.
+Gateware and bridge times are exact up to crystal and touches. Circuit and cover are drawn within assumed tolerances
+(:func:`drawn_circuit`, :func:`drawn_cover`), from 2.5 to 97.5 %.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Random collisions of a forearm: a sheet's reports against a momentum observer's."""
+"""Random collisions of a forearm, reported by a sheet and by a momentum observer."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from contactfpga_sim.model.golden.zones import Departure
 class GoldenBoard:
     """The part of :class:`contactfpga_sim.model.board.compiled.CompiledBoard` that a lockstep needs.
 
-    A frame has the cells at the end of a clock run, at most one a step. Zones equal the gateware's if cells rest for a
+    A frame has the cells at the end of a clock run, at most one a step. Zones are the gateware's if cells rest for a
     scan; times differ by up to a scan and a run.
     """
 

@@ -36,8 +36,8 @@ class Sheets(Mapping[str, WornSheet]):
     """The sheets of ``robot.toml`` on the bodies of a MuJoCo model, by the links' names.
 
     A link's ``frame`` names the body that wears it. The sheet is on the geom with the link's name (:func:`wear` makes
-    one), else on every geom of that body. :meth:`step` replaces ``mj_step``. While a program waits for a board, as in
-    ``sheets["arm"].board.next()``, the robot goes on as well.
+    one), else on every geom of that body. :meth:`step` replaces ``mj_step``. The robot goes on while a program waits,
+    as in ``sheets["arm"].board.next()``.
 
     Args:
       model, data: of MuJoCo; ``data`` is stepped here alone.
@@ -172,8 +172,8 @@ class Sheets(Mapping[str, WornSheet]):
     # ---- what the host knows
 
     def snapshot(self) -> Snapshot:
-        """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: touches at the scan
-        of the newest frames."""
+        """All links as a program knows them now, like :meth:`contactfpga.body.OpenBody.latest`: touches at the scan of
+        the newest frames."""
         observed = {name: worn.observe() for name, worn in self._worn.items()}
         states = States(self.body.links, observed, self.clock())
         return Snapshot(self.body, self.clock(), states, self._history if self._joints else None)

@@ -17,9 +17,8 @@ BACK_M = 0.01
 
 
 def wear(spec: Any, robot: str | Path) -> None:
-    """Add to a ``mujoco.MjSpec`` a massless geom per link of ``robot.toml``, with its name, on the body of its
-    frame: a box under a flat sheet, a cylinder in a bent one, else the convex hull of the cells. Its outside is the
-    sheet's."""
+    """Add to a ``mujoco.MjSpec`` a massless geom per link of ``robot.toml``, with its name, on the body of its frame: a
+    box under a flat sheet, a cylinder in a bent one, else the convex hull of the cells. Its outside is the sheet's."""
     for name, plan in Body.load(robot).links.items():
         body = spec.body(plan.frame)
         if body is None:

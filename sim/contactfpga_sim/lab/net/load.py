@@ -1,6 +1,6 @@
-"""Links through a router, in four processes: boards with publishers, router, and two readers of half each.
+"""Links through a router, in four processes: boards with publishers, router, and two readers.
 
-Frames are made beforehand, and delivered when due, so that boards cost almost nothing.
+Frames are made beforehand, so that boards cost almost nothing.
 """
 
 from __future__ import annotations

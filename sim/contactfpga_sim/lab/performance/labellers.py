@@ -1,5 +1,5 @@
-"""Clocks of the labeller's last record from a frame's last row: over touches at every place, recordings, and shapes
-that break labellers."""
+"""Clocks of the labeller's last record from a frame's last row, for touches, recordings, and shapes that break
+labellers."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def touches(skin: Skin) -> np.ndarray:
 
 def last_rows(frames: np.ndarray) -> np.ndarray:
     """(m, 2) uint64 words: the last two rows if the sheet ends after any row of (n, R, C) bool frames, or one row
-    later, if a cell is pressed in them. Every zone there leaves with the last row, so no other row decides."""
+    later, if a cell is pressed in them. Every zone there leaves with the last row."""
     words = np.pad(to_words(frames), ((0, 0), (1, 1)))
     pairs = np.stack([words[:, :-1], words[:, 1:]], axis=-1).reshape(-1, 2)
     return pairs[pairs.any(axis=1)]

@@ -135,15 +135,14 @@ def report_row(name: str, skin: Skin) -> str:
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
-    """Frame time of an adaptive scan by the golden model, and its speedup over a raster scan, for scenes of (n, R,
-    C) bool frames."""
+    """Frame time of an adaptive scan, and its speedup over a raster scan, for scenes of (n, R, C) bool frames."""
     head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
     return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
 
 
 def gain_row(name: str, frames: np.ndarray) -> str:
-    """A row of :func:`gain_table`. Each frame is held for some scans: most see a sheet at rest. The mean is of the
-    frame under way at a random instant."""
+    """A row of :func:`gain_table`. Each frame is held for some scans, so most see a sheet at rest. The mean is at a
+    random instant."""
     _, rows, columns = frames.shape
     known = facts(adaptive_skin(rows, columns))
     hold = HELD_SCANS * known.scan_clocks

@@ -1,4 +1,4 @@
-"""The loop of ``examples/reflex.py`` beside a computing Python thread: missed deadlines and false silences."""
+"""Missed deadlines and false silences of ``examples/reflex.py`` beside a computing Python thread."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Tables of the delay of frames to user code.
+"""Delay of frames to user code, which no test holds.
 
-Methods alternate, so that other load affects all equally. No test holds these times.
+Methods alternate, so that other load affects all equally.
 """
 
 from __future__ import annotations

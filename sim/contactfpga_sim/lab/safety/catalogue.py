@@ -1,4 +1,4 @@
-"""Electrical faults of docs/safety.md. To add one, extend :data:`FAULTS`; study and page follow."""
+"""Electrical faults of docs/safety.md; study and page follow :data:`FAULTS`."""
 
 from __future__ import annotations
 

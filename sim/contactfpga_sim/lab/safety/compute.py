@@ -1,5 +1,4 @@
-"""Every fault at every place, in every scene: its reports, their times, and earlier errors. Self-test faults also
-power up the compiled board."""
+"""Every fault at every place, in every scene: reports, their times, and earlier errors."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Throughput and delay of the driver on this machine: `python -m contactfpga_sim.lab.speed.driver`.
 
-Another process plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this process's CPU
-time, independent of other load; latencies are not. No test holds them.
+Another process plays a board with a moving fingertip on a pseudo-terminal. Rates are per CPU second of this process,
+independent of other load; no test holds them.
 """
 
 from __future__ import annotations

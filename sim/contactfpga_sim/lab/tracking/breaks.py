@@ -1,4 +1,4 @@
-"""Where ids are lost: one knob at a time, moved until fewer than 95 % of random placements keep them.
+"""Where ids are lost: each knob is moved until fewer than 95 % of random placements keep them.
 
 A placement shifts the scene by up to a pitch along both axes, and its frames by up to one.
 """

@@ -1,5 +1,4 @@
-"""Fingers that slide, cross, meet, tap, stop, follow and enter, with true numbers; and their frames by the golden
-model."""
+"""Moving fingers with true numbers, and their frames by the golden model."""
 
 from __future__ import annotations
 

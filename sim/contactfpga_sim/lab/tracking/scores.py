@@ -1,5 +1,4 @@
-"""Scores of the tracker, two baselines and a published tracker on random scenes and recordings: MOTA, IDF1 and id
-switches by py-motmetrics."""
+"""MOTA, IDF1 and id switches, by py-motmetrics, of the tracker, two baselines and a published tracker."""
 
 from __future__ import annotations
 
@@ -271,8 +270,8 @@ class _Linker:
         self._fresh = 0
 
     def take(self, labels: np.ndarray) -> dict[int, int]:
-        """Name of each label: the previous zone with most shared cells, largest share first. A merged zone gets its
-        name back in place."""
+        """Name of each label: the previous zone with most shared cells, largest share first; or a merged zone's old
+        name."""
         before, both = self._before, (self._before > 0) & (labels > 0)
         shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
         ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()

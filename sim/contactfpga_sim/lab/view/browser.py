@@ -1,4 +1,4 @@
-"""The view in a headless browser: what a user sees, and when."""
+"""The view in a headless browser."""
 
 from __future__ import annotations
 

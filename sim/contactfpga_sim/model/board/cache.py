@@ -1,5 +1,5 @@
-"""The folder of compiled gateware and cached results. Its files are executed, so only those that the user or root alone
-can write are used."""
+"""The folder of compiled gateware and cached results. Only files that the user or root alone can write are used, as
+they are executed."""
 
 from __future__ import annotations
 

@@ -97,9 +97,8 @@ class CompiledModel:
 _DRIVER = "board.cpp"
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
-"""Events that a board can record, in the driver's order: transfers of rows, zone records, divided records and bytes;
-changes of the transmit, contact and alive pins, of rows driven to the selecting level, and of driven columns; bytes
-decoded from the line."""
+"""Events that a board can record, in the driver's order: transfers; changes of the transmit, contact and alive pins, of
+rows driven to the selecting level, and of driven columns; bytes decoded from the line."""
 
 
 class CompiledBoard(CompiledModel):

@@ -1,6 +1,6 @@
 """Gateware as native code: Amaranth to RTLIL (or a netlist), Yosys to C++, a compiler to a library for ctypes.
 
-Libraries are cached, so that unchanged gateware imports neither Amaranth nor Yosys.
+Unchanged gateware, whose library is cached, needs neither Amaranth nor Yosys.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Library(ctypes.CDLL):
 
 
 def load(model: Model) -> Library:
-    """The library of a model, from the cache or built in some seconds with progress on stderr.
+    """The library of a model, cached or built in some seconds with progress on stderr.
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
     :class:`CompileFailed`, and :class:`~contactfpga_sim.model.board.cache.CacheError`.

@@ -1,4 +1,4 @@
-"""Keys of cached results: hashes of modules with all their imports, read from the text."""
+"""Keys of cached results: hashes of modules with all imports."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, in exact fractions and independent of the
-gateware's table."""
+"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, in exact fractions."""
 
 from __future__ import annotations
 

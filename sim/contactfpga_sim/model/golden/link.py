@@ -1,4 +1,4 @@
-"""The link: hellos, fault reports, frames and unit readings share the wire, and several sheets a line."""
+"""The link: packets of every kind, and of several sheets, on one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The raster scan: samples, contact pin, stuck columns, guard checks, device time."""
+"""The raster scan."""
 
 from __future__ import annotations
 

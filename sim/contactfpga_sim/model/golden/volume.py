@@ -1,4 +1,4 @@
-"""Zones and labeller clocks of very many (N, R, C) bool frames at once, for volume tests."""
+"""Zones and labeller clocks of very many (N, R, C) bool frames at once."""
 
 from __future__ import annotations
 

@@ -148,7 +148,6 @@ def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
 FAMILIES: dict[str, Callable[..., Scene]] = {
     family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving, finger)
 }
-"""Families by name."""
 
 
 def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values: Any) -> Contact:

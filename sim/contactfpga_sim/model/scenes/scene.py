@@ -184,7 +184,6 @@ def grip(skin: Skin) -> Scene:
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
     scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
 }
-"""Contact scenes by name."""
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
 """Contact scenes for closed sheets, by name."""

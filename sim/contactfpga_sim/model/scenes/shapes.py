@@ -130,7 +130,6 @@ SHAPES: dict[str, Callable[[int, int], np.ndarray]] = {
         *(rings, dots, stripes, diagonals, zigzag, full),
     )
 }
-"""Shapes by name."""
 
 
 def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:

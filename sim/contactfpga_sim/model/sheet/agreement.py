@@ -1,4 +1,4 @@
-"""Circuits in the project's model and, for an independent check, in ngspice, in each phase of the scan."""
+"""Circuits in the project's model and in ngspice, in each phase of the scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Converters at the board's pins, edge by edge by data sheet, with set inputs."""
+"""Converters at the board's pins, edge by edge by data sheet."""
 
 from __future__ import annotations
 

@@ -128,7 +128,6 @@ class Matrix:
         self._pressed = [0] * skin.rows
         self._reaches = [self._all_columns] * skin.row_lines
         self.stuck = 0
-        """Stuck columns."""
         self._shorts: Shorts | None = None
         self._released = LineBits(0, 0)  # let go, and lifted to the released level
         self._keeps = skin.derived.settle_clocks + 1 if skin.self_test else 0  # clocks

@@ -1,4 +1,4 @@
-"""Readings of a faulty sheet: joined lines, and faulty diodes, wires and switches.
+"""Readings of a sheet with joined lines and faulty diodes, wires and switches.
 
 In :class:`Wiring` only the pulls have a resistance; :func:`at_rest` uses :mod:`contactfpga.design.circuit`.
 """

@@ -1,6 +1,6 @@
 """Random mutants of the gateware, and which of them the comparison with the golden model detects.
 
-Survivors of short stimuli are tried for a proof of equivalence, then in longer stimuli and proofs.
+Survivors of short stimuli go through proofs of equivalence and longer stimuli in turn.
 """
 
 from __future__ import annotations

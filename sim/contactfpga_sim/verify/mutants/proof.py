@@ -1,11 +1,10 @@
 """Proofs that mutants change nothing in any clock from power-up.
 
-Gateware and mutant run side by side on the same inputs. Only registers that the mutant may affect are doubled; the
-question is whether an output or any other register can ever differ. Registers that differ at the end of a
-counterexample are doubled too, and the question is repeated.
+Gateware and mutant have the same inputs. Only registers that the mutant may affect are doubled; the question is whether
+an output or any other register can ever differ. Registers that differ at the end of a counterexample are doubled too,
+and the question is repeated.
 
-Some registers are cut to keep the problem small: they may hold anything. That only adds behavior, so unreachable states
-stay unreachable.
+Some registers are cut to keep the problem small: they may hold anything, which only adds behavior.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Stimuli for mutants: touches, noise, requests, and inputs for options of a Skin."""
+"""Stimuli for mutants of one sheet's board."""
 
 from __future__ import annotations
 

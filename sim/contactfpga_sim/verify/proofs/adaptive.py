@@ -1,4 +1,4 @@
-"""The adaptive scan: its choice of rows, and no contention of rows driven together."""
+"""The adaptive scan's choice of rows, without contention."""
 
 from functools import partial
 

@@ -1,7 +1,7 @@
 """Whether claims of a circuit hold: forever, by induction over its clocks, or for some clocks from power-up.
 
 A program of its own, so that it can be ended: ``python -m contactfpga_sim.verify.proofs.induction FILES CLOCKS``.
-CaDiCaL, a SAT solver, chooses all inputs and, in a step of the induction, all registers of the first clock.
+CaDiCaL, a SAT solver, chooses all inputs and, in an induction, the first clock's registers.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Unrolling:
         return bool(self._solver.solve([_signed(literal) for literal in literals if literal != 1]))
 
     def violated(self) -> bool:
-        """Whether a claim can fail in the newest clock of a run that repeats no state. A shortest counterexample from
-        power-up repeats none, so neither does any part of it."""
+        """Whether a claim can fail in the newest clock of a run that repeats no state, as no shortest counterexample
+        from power-up does."""
         while self.satisfiable(self._bad):
             holds, seen = self._holds(), dict[tuple[bool, ...], Sequence[int]]()
             for _, latches in self._variables:
@@ -144,8 +144,8 @@ def prove(circuit: aig.Circuit, clocks: int) -> Found:
 def prove_from_rest(circuit: aig.Circuit, clocks: int) -> Found:
     """Whether claims hold from each clock at rest to the next, which must come within :data:`LONGEST` clocks.
 
-    The solver chooses the registers ``clocks`` clocks before rest. Lemmas pin them down there, which spares it most of
-    the search of :func:`prove`.
+    The solver chooses the registers ``clocks`` clocks before rest. Lemmas pin them down, which spares most of
+    :func:`prove`'s search.
     """
     start = Unrolling(circuit, power_up=True)
     for clock in range(clocks + LONGEST):

@@ -1,4 +1,4 @@
-"""The labeller: no overflow or underflow, nothing left over, and harmless stalls."""
+"""The labeller's memories and stalls."""
 
 from functools import partial
 

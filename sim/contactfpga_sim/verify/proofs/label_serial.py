@@ -1,4 +1,4 @@
-"""The serial labeller: its records are the zones, its memories neither overflow nor collide."""
+"""The serial labeller."""
 
 from functools import partial
 
@@ -84,8 +84,7 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
 
 
 def cells_leave_together(proof: Proof, columns: int, connectivity: int) -> None:
-    """The labeller with two marked cells of each frame in place of moments, which it adds as those of a cell
-    (:func:`a_cell_is_added`).
+    """The labeller with marks (:mod:`.marked`), which it adds as a cell's moments (:func:`a_cell_is_added`).
 
     Free: rows at any time, and the marked cells. Assumed: records are taken at once.
 

@@ -1,4 +1,4 @@
-"""The link: which frames are sent, with which bytes, and the odometer's digits."""
+"""The link, and the odometer's digits."""
 
 from functools import partial
 from typing import Any

@@ -1,6 +1,6 @@
 """Two marked cells of each frame in place of moments.
 
-Moments are sums over cells. So a zone's are right if each of its cells is added once, and no other.
+Moments are sums over cells, so they are right if each cell of the zone is added once, and no other.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Driven columns: never while a row is selected, and none held from elsewhere."""
+"""Driven columns."""
 
 from functools import partial
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Guard lines in a raster scan: silent lines, and no others, are reported."""
+"""Guard lines in a raster scan."""
 
 from functools import partial
 from typing import Literal

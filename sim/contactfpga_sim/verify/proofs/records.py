@@ -46,8 +46,7 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
 
 
 def cells_leave_together(proof: Proof, columns: int, connectivity: int) -> None:
-    """The labeller with two marked cells of each frame in place of moments, which a step adds as those of its run
-    (:func:`a_run_has_its_cells`).
+    """The labeller with marks (:mod:`.marked`), which a step adds as its run's moments (:func:`a_run_has_its_cells`).
 
     Free: any rows at any time, and the marked cells. Assumed: records are taken at once.
 

@@ -1,4 +1,4 @@
-"""Fault reports: true to the scan, none withheld, and each lets a waiting frame pass."""
+"""Fault reports."""
 
 from functools import partial
 from unittest import mock

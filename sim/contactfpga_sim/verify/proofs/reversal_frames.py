@@ -1,4 +1,4 @@
-"""Frames of a line reversal: each touched row is selected and handed on once, in order."""
+"""Frames of a line reversal."""
 
 from collections.abc import Callable
 from functools import partial

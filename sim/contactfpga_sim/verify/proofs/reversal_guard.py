@@ -1,4 +1,4 @@
-"""Line reversal with guard lines: no contention, no false reports, and checks are made."""
+"""Line reversal with guard lines."""
 
 from functools import partial
 from typing import Any
@@ -21,12 +21,9 @@ def _inverted(sheet: Sheet) -> Value:
 
 
 def pins(proof: Proof, **changes: Any) -> None:
-    """Free: the sheet and the later stages.
-
-    Claimed: at most one row is selected, including the guard row, and none while rows are released; no column is driven
-    then nor in the clock before or after; rows are released together, except the guard row, held at the released level.
-    Columns are driven to the selecting level only while rows are released. In the first clock nothing is driven.
-    """
+    """Free and claimed: as in :func:`contactfpga_sim.verify.proofs.reversal.pins`, the guard row included; but this row
+    is held at the released level while the others are released together. Columns are driven to the selecting level only
+    while rows are released."""
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     drive, columns, every = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive, (1 << sheet.skin.rows) - 1
     rows = drive[: sheet.skin.rows]

@@ -1,4 +1,4 @@
-"""The scanner: the driven row in each clock, and that each sample is offered once."""
+"""The raster scanner's rows and samples."""
 
 from functools import partial
 from typing import Literal

@@ -1,4 +1,4 @@
-"""The self-test of line reversal: one line is driven at a time, and slots show the pins' levels."""
+"""The self-test of line reversal."""
 
 from functools import partial
 from typing import Any

@@ -1,4 +1,4 @@
-"""Stages that pass on their inputs, without loss or repetition; and the divider."""
+"""Stages that pass on their inputs; and the divider."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Pressure units: converters are driven by data sheet and read correctly, and thresholds are compared."""
+"""Pressure units: converters and thresholds."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Records of frames as words: whole frames alone, each word once and in order."""
+"""Records of frames as words."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""`contactfpga body`: sheets on one robot; a file per topic."""
+"""The command `contactfpga body`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga body learn`: cells that a folding cover presses, by a joint's angle."""
+"""The command `contactfpga body learn`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga body register`: the place of a sheet on its link, by pressing known points."""
+"""The command `contactfpga body register`."""
 
 from __future__ import annotations
 

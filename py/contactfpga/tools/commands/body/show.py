@@ -1,4 +1,4 @@
-"""`contactfpga body ROBOT.toml`: every link's state and contacts, in the base frame."""
+"""The command `contactfpga body`."""
 
 from __future__ import annotations
 

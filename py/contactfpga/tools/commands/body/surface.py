@@ -1,4 +1,4 @@
-"""`contactfpga body surface`: the places of a sheet's cells on a link of any shape."""
+"""The command `contactfpga body surface`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga bringup`: leads through a kit's first power-up, and writes the findings into one file."""
+"""The command `contactfpga bringup`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga cover`: the soft cover's impact, sensitivity and design; a file per topic.
+"""The command `contactfpga cover`.
 
 Input and JSON are in SI units, tables in mm and kPa.
 """

@@ -1,4 +1,4 @@
-"""`contactfpga cover design`: foam, thickness and pitch for an arm, a switch and limits."""
+"""The command `contactfpga cover design`."""
 
 from __future__ import annotations
 

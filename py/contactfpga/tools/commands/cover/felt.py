@@ -1,4 +1,4 @@
-"""`contactfpga cover felt`: whether a light finger is felt anywhere on a Skin's sheet."""
+"""The command `contactfpga cover felt`."""
 
 from __future__ import annotations
 

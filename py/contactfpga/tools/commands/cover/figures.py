@@ -1,4 +1,4 @@
-"""`contactfpga cover figures`: the paper's curves, the impact over time and the design map."""
+"""The command `contactfpga cover figures`."""
 
 from __future__ import annotations
 

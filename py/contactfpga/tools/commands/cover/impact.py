@@ -1,4 +1,4 @@
-"""`contactfpga cover impact`: an arm runs into something."""
+"""The command `contactfpga cover impact`."""
 
 from __future__ import annotations
 

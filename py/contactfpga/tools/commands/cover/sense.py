@@ -1,4 +1,4 @@
-"""`contactfpga cover sense`: the force that closes a switch under the cover, or the reach of a force."""
+"""The command `contactfpga cover sense`."""
 
 from __future__ import annotations
 

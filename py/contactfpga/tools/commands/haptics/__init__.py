@@ -1,4 +1,4 @@
-"""`contactfpga haptics`: forces at contacts, from pressure units; a file per topic."""
+"""The command `contactfpga haptics`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics contacts`: the force at each contact, or without contacts the center of pressure."""
+"""The command `contactfpga haptics contacts`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics place`: positions of the units under a bumper."""
+"""The command `contactfpga haptics place`."""
 
 from __future__ import annotations
 

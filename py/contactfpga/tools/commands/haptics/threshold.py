@@ -1,4 +1,4 @@
-"""`contactfpga haptics threshold`: the deviation from which units and sums of a board raise `contact`."""
+"""The command `contactfpga haptics threshold`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga haptics wrench`: the contacts' wrench on the link, from the readings of its units."""
+"""The command `contactfpga haptics wrench`."""
 
 from __future__ import annotations
 

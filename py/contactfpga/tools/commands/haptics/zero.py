@@ -1,4 +1,4 @@
-"""`contactfpga haptics zero`: reads a board's unloaded units, and sets their zeros."""
+"""The command `contactfpga haptics zero`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga study`: the project's results, computed again; a file per topic."""
+"""The command `contactfpga study`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`contactfpga study arm`: the experiment of the paper's Section IV, its table and its pictures."""
+"""The command `contactfpga study arm`."""
 
 from __future__ import annotations
 

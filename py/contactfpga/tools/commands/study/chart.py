@@ -1,4 +1,4 @@
-"""`contactfpga study chart`: the picture of speed against accuracy, and its numbers."""
+"""The command `contactfpga study chart`."""
 
 from __future__ import annotations
 

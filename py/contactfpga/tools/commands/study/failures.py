@@ -1,4 +1,4 @@
-"""`contactfpga study failures`: sweeps every knob, writes the table and the pictures."""
+"""The command `contactfpga study failures`."""
 
 from __future__ import annotations
 

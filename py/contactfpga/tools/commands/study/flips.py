@@ -1,4 +1,4 @@
-"""`contactfpga study flips`: flips bits of the running gateware, and reports the host's reaction."""
+"""The command `contactfpga study flips`."""
 
 from __future__ import annotations
 

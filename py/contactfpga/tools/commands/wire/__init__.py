@@ -1,4 +1,4 @@
-"""`contactfpga wire`: the pressed cells, live, to check position and behavior of every switch."""
+"""The command `contactfpga wire`."""
 
 from __future__ import annotations
 
