@@ -1,4 +1,4 @@
-"""The entry point of the command `contactfpga`, also as ``python -m contactfpga``."""
+"""The command `contactfpga`, also as ``python -m contactfpga``."""
 
 from typing import NoReturn
 

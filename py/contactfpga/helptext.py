@@ -1,4 +1,4 @@
-"""The text that `help()` shows of a class: its docstring, and its fields with theirs, which Python drops."""
+"""The text of `help()` on a class, with its fields' docstrings, which Python drops."""
 
 from __future__ import annotations
 

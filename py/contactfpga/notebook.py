@@ -1,4 +1,4 @@
-"""SVG and HTML by which frames, contacts and recordings show themselves in a notebook, without further imports."""
+"""SVG and HTML of frames, contacts and recordings in a notebook, without further imports."""
 
 from __future__ import annotations
 

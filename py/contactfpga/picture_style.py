@@ -1,4 +1,4 @@
-"""The common style of all pictures: background, palette, and letters legible on a page 720 pixels wide.
+"""The common style of all pictures, legible on a page 720 pixels wide.
 
 matplotlib is imported only for drawing.
 """

@@ -29,7 +29,6 @@ class Prediction:
     model: str
     """Model under test: gateware, bridge, circuit or cover."""
     command: str
-    """Command that computes the value."""
     date: datetime.date
     commit: str
     """Abbreviated hash of the commit that computed the value."""

@@ -1,4 +1,4 @@
-"""One port and all its listeners: reading, notification, and closing."""
+"""One port and all its listeners."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Reader of boards' bytes in the MCAP file or files of one `contactfpga record`.
 
-Every read is bounded, because the sizes stated in a file may be false.
+Every read is bounded, because stated sizes may be false.
 """
 
 from __future__ import annotations

@@ -94,7 +94,6 @@ class Stats:
 
 
 def total(every: Iterable[Stats]) -> Stats:
-    """The sum of all counters."""
     found = Stats()
     for one in every:
         for field in dataclasses.fields(Stats):

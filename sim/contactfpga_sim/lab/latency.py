@@ -44,8 +44,6 @@ class RecordedTouch(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Latency:
-    """Results of :func:`measure`."""
-
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
     change_to_last_byte_us: Spread

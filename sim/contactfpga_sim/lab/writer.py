@@ -17,8 +17,6 @@ _SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end 
 
 
 class PageSection(NamedTuple):
-    """A section of a page."""
-
     text: str
     fingerprint: str
 

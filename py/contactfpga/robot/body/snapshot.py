@@ -1,4 +1,4 @@
-"""All links of a body at one moment, and their contacts: place, age, and with units force."""
+"""All links of a body at one moment, and their contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of a link: its newest frame, and whether it is current; and a body's errors."""
+"""The state of a link, and a body's errors."""
 
 from __future__ import annotations
 

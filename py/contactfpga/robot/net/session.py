@@ -1,4 +1,4 @@
-"""Zenoh sessions, by default unreachable from other machines; keys of boards, and local endpoints."""
+"""Zenoh sessions, by default unreachable from other machines."""
 
 from __future__ import annotations
 

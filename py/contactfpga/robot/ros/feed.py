@@ -36,7 +36,6 @@ class Moments:
         self._offset_ns = 0
 
     def now(self) -> int:
-        """The current time in ns."""
         return self._now_ns()
 
     def of(self, zones: Zones) -> int:
@@ -83,7 +82,6 @@ class Diagnostics:
         self._faults: tuple[str, ...] = ()
 
     def frame(self, zones: Zones) -> None:
-        """Count a frame."""
         self._heard_s = self._board.clock()
         if zones.arrived_s is not None:
             self._waited_s = max(self._waited_s, self._heard_s - zones.arrived_s)

@@ -1,4 +1,4 @@
-"""Tables for any terminal width: columns that do not fit follow below, after the first columns again."""
+"""Tables for any terminal width."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drawing of a frame as plain arrays: cell colors, circles, barycenters, trails."""
+"""The drawing of a frame as plain arrays."""
 
 from __future__ import annotations
 

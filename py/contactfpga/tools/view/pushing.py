@@ -1,4 +1,4 @@
-"""A simulated robot, or copies side by side, in a server's page: the mouse's actions, and the forces."""
+"""A simulated robot, or copies side by side, in a server's page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings of one board, playable from any moment: byte files, and MCAP files."""
+"""Recordings of one board, playable from any moment."""
 
 from __future__ import annotations
 

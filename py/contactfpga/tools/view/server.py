@@ -1,4 +1,4 @@
-"""viser's server with a guard: only a browser with the token may read and press, on a page of this server."""
+"""viser's server with a guard."""
 
 from __future__ import annotations
 

@@ -98,7 +98,6 @@ def _reasons(found: dict[str, RunRecord], paper: bool) -> list[str]:
 
 
 def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
-    """Runs in SI units."""
     first = next(iter(found.values())).outcome
     known: dict[str, Any] = {
         "case": name,

@@ -124,7 +124,6 @@ def step_table() -> str:
 
 
 def sheet_table(found: ArmRuns) -> str:
-    """Time from switch to controller in the gateware's runs, and its cost."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), pictures.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):

@@ -23,7 +23,6 @@ SETTLED_MS = 3000
 
 
 def draw(folder: Path) -> Path:
-    """The upper body with labeled contacts."""
     image = folder / "robot.png"
     robot = opening.ViewRequest(port=str(examples() / "robot.toml"))
     with opening.opened(robot, http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:

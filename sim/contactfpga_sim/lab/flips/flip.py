@@ -32,8 +32,6 @@ class Flip(NamedTuple):
 
 
 class FlipOutcome(NamedTuple):
-    """Outcome of a flip."""
-
     name: str
     memory: bool
     outcome: Outcome

@@ -185,8 +185,6 @@ def _places(
 
 @dataclasses.dataclass(frozen=True)
 class PairForces:
-    """Estimates for two contacts."""
-
     zones: int
     off_n: tuple[float, ...]
     """Error of each push, if there are two zones."""

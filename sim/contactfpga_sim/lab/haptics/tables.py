@@ -149,12 +149,10 @@ SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` 
 
 
 def breaks_pictures() -> str:
-    """A heading per break, and a picture or sentence."""
     return tables.headed(breaks.KNOBS, "haptics", SAID)
 
 
 def draw_felt(folder: Path) -> list[Path]:
-    """Error over time, and a picture per break."""
     drawn = [_front(folder / "haptics-front.svg")]
     (folder / "haptics").mkdir(exist_ok=True)
     for name in (one for one in breaks.KNOBS if one not in SAID):

@@ -21,8 +21,6 @@ SET = {"set by the rule": {}, "as new": {"timer_ms": DEFAULT_TIMER_MS, "event": 
 
 
 class BridgeRow(NamedTuple):
-    """A line of :func:`bridge_table`."""
-
     speed: str
     settings: str
     sheet: str

@@ -212,7 +212,6 @@ TOUCHES = 196
 
 
 def latency_table() -> str:
-    """Latency of the reversal scan, and of the reference sheet's raster scan."""
     head = (
         "sheet", "contact", "touch to `contact` pin, worst", "touch to last byte, median / worst", "bound",
         "change to last byte, worst", "frames per second", "bytes",

@@ -17,8 +17,6 @@ PACE = Pace(1_000, 1, 2.0)
 
 
 class Missed(NamedTuple):
-    """Missed deadlines of the loop."""
-
     deadlines: int
     missed: int
     silent: int

@@ -94,8 +94,6 @@ Places = Callable[[Skin], Mapping[str, SheetFault]]
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """An electrical fault."""
-
     title: str
     effect: str
     """The error if unnoticed."""

@@ -47,7 +47,6 @@ def faults_table() -> str:
 
 
 def coverage_table() -> str:
-    """Reported faults, with and without each option."""
     rows = [["options", "faults reported at every place", "share of faults", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]

@@ -34,7 +34,6 @@ def size_table() -> str:
 
 
 def line_table() -> str:
-    """Rate and age of frames by sheets, each under two fingertips."""
     rows = [_row(count, baud) for baud in BAUDS for count in COUNTS]
     return writer.table_of([("baud", "sheets", "frames/s per sheet", "replaced", "longest wait for the line"), *rows])
 

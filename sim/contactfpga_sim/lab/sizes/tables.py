@@ -52,14 +52,12 @@ def gateware_table() -> str:
 
 
 def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
-    """LUT4s, flip-flops, block RAMs and clock of a design."""
     print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
     found = size.measure(lambda: size.DESIGNS[name](size.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
 
 
 def faults_table() -> str:
-    """The reference Skin and the fast one with fault-reporting options."""
     rows = [*_fault_rows(Skin(), "none", FAULTS), *_fault_rows(Skin.load(FAST), f"`{FAST}`", FAST_FAULTS)]
     return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
 

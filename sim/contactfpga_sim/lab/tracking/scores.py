@@ -158,7 +158,6 @@ class Score:
 
     @property
     def switches_per_1000(self) -> float:
-        """Id switches per thousand judged frames."""
         return 1000 * self.switches / self.frames
 
     @property

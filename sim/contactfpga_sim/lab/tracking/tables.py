@@ -94,7 +94,6 @@ def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
 
 
 def ahead_table() -> str:
-    """The tracker's lead over others, if uncertain."""
     names = [name for name in scores.TRACKERS if name != "`Tracker`"]
     rows = [("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))]
     for (family, rate), found in scores.all_scenes().items():
@@ -154,7 +153,6 @@ SHOWN = tuple(family for family in scenes.FAMILIES if family != "tapping")
 
 
 def draw(folder: Path) -> Path:
-    """Share of correct ids by family, rate and tracker."""
     import matplotlib
 
     with SCORES.open(newline="", encoding="utf-8") as file:

@@ -302,7 +302,6 @@ def clicks_table(times: ViewTimes) -> str:
 
 
 def draw(folder: Path) -> list[Path]:
-    """The view at rest and in motion, and a recording's picture."""
     image, clip, drawn = folder / "view.png", folder / "view.webp", folder / "plot.svg"
     plotted(drawn)
     with opening.opened(http_port=0) as shown, browser.visit(shown, *SIZE, dark=True) as visitor:

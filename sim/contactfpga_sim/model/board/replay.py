@@ -38,11 +38,11 @@ class ReplayedFrame:
 
     frame: Frame
     first_record: int | None
-    """Clocks from the transfer of the frame's last row to its first record, maybe negative; None without a zone."""
+    """Clocks from the last row's transfer to the first record, maybe negative; None without a zone."""
     last_record: int | None
-    """Clocks from the transfer of the frame's last row to its last record; None without a zone."""
+    """Clocks from the last row's transfer to the last record; None without a zone."""
     duration: int
-    """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
+    """Clocks from the first row's transfer to the end of the last byte on the line."""
 
 
 def load(

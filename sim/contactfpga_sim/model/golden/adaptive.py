@@ -1,4 +1,4 @@
-"""The adaptive scan: driven rows, samples, and contact pin."""
+"""The adaptive scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scan by line reversal: when rows are read and driven, and the contact pin."""
+"""The scan by line reversal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Line reversal: no contention, each touched row is handed on once, and no closed switch is missed."""
+"""The scan by line reversal, at its pins."""
 
 from functools import partial
 from typing import Any

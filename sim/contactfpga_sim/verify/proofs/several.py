@@ -1,4 +1,4 @@
-"""Several sheets on a line: packets are whole and in sequence, and only the sheet with the grant sends."""
+"""Several sheets on a line."""
 
 from functools import partial
 from unittest import mock

@@ -1,4 +1,4 @@
-"""The steps of a first power-up, each a function of a board on the bench."""
+"""The steps of a first power-up."""
 
 from __future__ import annotations
 
