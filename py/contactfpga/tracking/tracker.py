@@ -1,4 +1,4 @@
-"""Follows contacts from frame to frame."""
+"""Follows contacts from frame to frame; areas distinguish merging and parting zones from lifts and touches."""
 
 from __future__ import annotations
 

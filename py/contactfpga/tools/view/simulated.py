@@ -1,4 +1,4 @@
-"""A robot in MuJoCo that wears sheets, in real time: the mouse pushes it, and a reflex moves it.
+"""A robot in MuJoCo that wears sheets, in real time.
 
 Copies with different skins run in lockstep.
 """

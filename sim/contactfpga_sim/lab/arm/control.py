@@ -1,4 +1,4 @@
-"""The motor's controller: a PI speed loop that reacts to contact."""
+"""The motor's controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The stages from a touch to user code; all but the host's are exact."""
+"""The stages from a touch to user code."""
 
 from __future__ import annotations
 

@@ -163,19 +163,16 @@ def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: P
 
 
 def by_closings(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Estimate from the push at each closing."""
     closings = _closings(case, rng, one)
     return finder.locate(one.cells, _measured(case, rng, one.push_n), closings), bound_m(case, one)
 
 
 def by_center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Estimate from three units alone."""
     found = _center(case, finder, rng, one)
     return found, found.radius_m
 
 
 def by_both(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
-    """Estimate from closings and units."""
     center = _center(case, finder, rng, one)
     found = finder.locate(one.cells, one.push_n, _closings(case, rng, one), center)
     return found, math.nan

@@ -37,8 +37,6 @@ Rates = list[tuple[float, rated.Rate]]
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """A parameter, moved until ids are lost."""
-
     name: str
     title: str
     axis: str

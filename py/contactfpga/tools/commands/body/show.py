@@ -1,4 +1,4 @@
-"""The command `contactfpga body`."""
+"""The command `contactfpga body ROBOT.toml`."""
 
 from __future__ import annotations
 
