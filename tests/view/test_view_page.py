@@ -110,12 +110,12 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
 
 def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
     shown, visitor = seen
-    places = []
+    places = [fitted(shown, visitor)[2]]
     for key in "234":
         visitor.page.keyboard.press(key)
         places.append(fitted(shown, visitor, places)[2])
     visitor.page.locator("button:has-text('overview')").click()
-    fitted(shown, visitor, places)
+    fitted(shown, visitor, places[1:])
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -130,7 +130,7 @@ def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board
     now, changed = keys(copy, BOARD, loaded)
     assert [str(file) for file, key in changed.items() if key == now] == []
     assert len(set(changed.values())) == len(loaded)
-    for named in ("derived", "checks", "limits"):
+    for named in ("derived", "checks", "sheet"):
         assert copy / f"py/contactfpga/skin/{named}.py" in changed
 
 
