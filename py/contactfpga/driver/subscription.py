@@ -250,7 +250,7 @@ def frame_of(found: object) -> Zones:
 
 
 def checked_item(found: object) -> object:
-    """As :func:`frame_of`, for any item."""
+    """The awaited item; raises the error that came in its place."""
     if isinstance(found, ContactFPGAError):
         raise found
     return found

@@ -74,7 +74,7 @@ def worst_text(found: FlipResults) -> str:
 
 
 def _seconds(row: Row) -> float:
-    """As the file beside the page states it: of flips that are equal there the page names the first."""
+    """Seconds for which the flip was silently wrong, rounded as in the page's file, so that both agree on the worst."""
     return round(row.found.seconds, 6)
 
 

@@ -1,4 +1,4 @@
-"""The serial labeller."""
+"""Proofs of the serial labeller."""
 
 from functools import partial
 

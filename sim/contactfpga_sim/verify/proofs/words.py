@@ -68,7 +68,7 @@ def frames_leave_whole(proof: Proof, skin: Skin) -> None:
 
 
 class _Frame:
-    """Of a frame: whether there is one, the place of its last word, and the word at the followed place."""
+    """A frame that may be there: the place of its last word, and its word at the followed place."""
 
     def __init__(self, place, word, name: str):
         self.there = Signal(name=f"{name}_there")
