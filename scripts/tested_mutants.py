@@ -39,9 +39,9 @@ COUNT = 60
 """Changes that are drawn."""
 
 EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {
-    ("units/watch.py", "compares & (self.sum != count - 1) -> (compares)"): (
-        "alive",
-        "Believed equivalent: `compares` is high for as many clocks in a row as there are sums. It is gone now.",
+    ("label/steps.py", "left.work & has_before -> (has_before)"): (
+        "equivalent",
+        "Once the walk of a row has ended, no run is left in it (proof *nothing overflows, nothing is left*).",
     ),
 }
 """Of changes that no test notices, by file and text: whether they are ``equivalent``, or ``alive``; and why."""

@@ -109,7 +109,7 @@ LAB = ("boards", "browser", "circuit", "cover", "scenes", "sheet", "studies", "v
 ROBOT = ("body", "haptics", "mujoco", "net", "recordings", "ros")
 """Folders of tests of what serves a robot; all others are of what reads a sheet."""
 STEP = 3
-"""Of the cases of one test every third is quick, from the first."""
+"""Of the cases of one test every third is quick, from the first, unless they are marked ``whole``."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -131,8 +131,9 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     ranks = {name: rank for rank, name in enumerate(FIRST)}
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
-    third = 0 if config.getoption("quick") else config.getoption("third")
-    kept = items if third is None else _third(items, third)
+    quick = config.getoption("quick")
+    third = 0 if quick else config.getoption("third")
+    kept = items if third is None else _third(items, third, whole=quick)
     if config.getoption("passed"):
         passed = _passed(config.getoption("passed"))
         kept = [item for item in kept if _result(item.nodeid) not in passed]
@@ -142,11 +143,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item in left]
 
 
-def _third(items: list[pytest.Item], number: int) -> list[pytest.Item]:
-    """Every third case of each test, and one of a test with fewer than three."""
+def _third(items: list[pytest.Item], number: int, whole: bool) -> list[pytest.Item]:
+    """Every third case of each test, and one of a test with fewer than three; ``whole``: all of those marked so."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+        kept_whole = whole and item.get_closest_marker("whole")
+        cases.setdefault(item.nodeid if kept_whole else item.nodeid.partition("[")[0], []).append(item)
     return [item for found in cases.values() for item in found[number % min(STEP, len(found)) :: STEP]]
 
 

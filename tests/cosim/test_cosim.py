@@ -90,6 +90,7 @@ def test_reference_skin_in_amaranths_simulator():
     assert flags_in(Skin(), expected) >= {"hello", "heard", "overwritten", "fault", "cells"}
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(
     "number",
     sample(range(len(COVERING)), quick=each_choice(COVERING)),

@@ -12,6 +12,7 @@ from amaranth.sim import Simulator
 
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
+from contactfpga.wire.hello import Hello
 from contactfpga_hdl.core import Core
 from contactfpga_hdl.link.records import Records
 from contactfpga_sim.model import golden
@@ -150,15 +151,15 @@ def frames(rng, skin):
         at += int(rng.integers(scan // 2, 2 * scan))
 
 
-def play(skin, seed, takes):
-    """The core under random frames; ``takes(clock)`` is whether its records are taken. Also its timeline from when
-    reset ends."""
+def play(skin, seed, takes, received=()):
+    """The core under random frames; ``takes(clock)`` is whether its records are taken, ``received`` are (clock, bytes)
+    at its pin ``rx``. Also its timeline from when reset ends."""
     given = list(frames(np.random.default_rng(seed), skin))
     core = Core(skin)
     ports = ip.ports(skin, core)
     clocks = given[-1][0] + 2 * skin.derived.frame_clocks
     taken = [takes(clock) for clock in range(clocks)]
-    timeline = Timeline([(clock, cells, None) for clock, cells in given])
+    timeline = Timeline([(clock, cells, None) for clock, cells in given], list(received))
     words = ip.simulated(skin, core, ports, timeline, clocks, lambda clock: (clock % 3 == 0, taken[clock]))
     late = Timeline([(clock - ip.RESET, cells, None) for clock, cells in given])
     return Played(ports, words, taken), late
@@ -240,11 +241,12 @@ def test_a_reader_that_never_takes_keeps_its_frame_and_holds_up_nothing(name):
     assert found[1:] == list(range(found[1], found[1] + len(found) - 1))
 
 
-def test_both_streams_tell_of_the_same_zones():
+def test_both_streams_tell_of_the_same_zones_and_a_request_is_answered():
     skin = SKINS["moments"]
-    played, _ = play(skin, 4, lambda clock: True)
+    played, _ = play(skin, 4, lambda clock: True, golden.requests([600], skin.derived.bit_clocks))
     some = (played.levels(f"m_axis_t{name}") for name in ("valid", "ready", "data"))
     events = Conversation("a core").receive(bytes(data for valid, ready, data in zip(*some) if valid & ready), 0.0)
+    assert [event.heard > 0 for event in events if isinstance(event, Hello)] == [False, True]
     sent = [event.zones.frame for event in events if isinstance(event, Arrival)]
     frames, records = {}, []
     for data, last in filter(None, played.records()):

@@ -1,6 +1,10 @@
 """The adaptive scan: which rows are driven (docs/timing.md, Adaptive scan), how many row times that takes, and that
 nothing is later than in a raster scan."""
 
+import collections
+import functools
+import operator
+
 import numpy as np
 import pytest
 from sample import each_choice, sample
@@ -46,6 +50,7 @@ def play(board: CompiledBoard, timeline: Timeline, cycles: int) -> int:
 # ---- gateware and golden model
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("number", sample(range(len(COVERING)), quick=each_choice(COVERING)))
 def test_covering_set_in_amaranths_simulator(number):
     skin = skin_for(COVERING[number])
@@ -120,6 +125,25 @@ def test_a_disturbed_register_of_an_untouched_sheet_is_right_again_one_slot_late
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100
     assert outputs[lost] == (1 << skin.rows) - 1
     assert outputs[lost + 2 * known.row_clocks] == 0
+
+
+def test_columns_that_keep_their_level_for_all_of_the_release_time_but_a_clock_are_not_stuck(monkeypatch):
+    skin = Skin(**SMALL)
+    known = facts(skin)
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[2, 1] = cells[3, 0] = True
+    exact = record.InputDriver.pins
+    pressed = collections.deque(maxlen=known.row_clocks - known.settle)  # now and in the clocks before; low is pressed
+
+    def pins(self, cycle, levels):
+        columns, *others = exact(self, cycle, levels)
+        pressed.append(columns)
+        return functools.reduce(operator.and_, pressed), *others
+
+    timeline, cycles = Timeline([(7, cells, None)]), 30 * known.row_clocks
+    trace = predict(skin, timeline, cycles)
+    monkeypatch.setattr(record.InputDriver, "pins", pins)
+    assert compare(trace, bench_amaranth.run(skin, timeline, cycles)) > 100
 
 
 CROWDED = [((16, 16), 4, "moments"), ((20, 24), 8, "cells")]

@@ -243,6 +243,8 @@ def test_a_row_that_is_empty_when_it_is_driven_is_told_as_motion(bench):
     assert moved.motion[-1] == 0, "the next frame is not"
     masked = [(40, last, None), (begun + 1, nothing, None)]
     assert not any(live(bench, skin, Timeline(masked), 200).motion), "a masked switch may have been the one"
-    slow = skin.replace(debounce="sym_defer_pk", debounce_release_us=50.0, mask=())
+    slow = skin.replace(debounce="sym_defer_pk", debounce_release_us=50.0)
+    assert not any(live(bench, slow, Timeline(masked), 200).motion), "with debounce, too"
+    slow = slow.replace(mask=())
     kept = live(bench, slow, Timeline([(40, top, None), (90, nothing, None)]), 200)
     assert sum(kept.motion) <= 2 * facts(slow).row_clocks + 20

@@ -35,7 +35,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
     """Free: any rows at any time. Assumed: records are taken at once, which ``stalls_change_nothing`` permits.
 
     Claimed: the stacks neither overflow nor underflow; no place of the table is written while it holds an open zone, or
-    read while it holds none or in the clock of its write; after a frame's last row no zone is open.
+    read while it holds none or in the clock of its write; after a frame's last row no zone is open; a walk that has
+    ended leaves no run.
     """
     m = proof.m
     dut = RunLabeller(skin_of(2, columns, connectivity, closed))
@@ -71,6 +72,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: boo
         proof.claim(Mux(joined.place[-1], joined.place[:-1] <= waiting(derived), joined.place < derived.open_zones))
     with m.If(join.join_valid & joined.end):
         proof.claim(live == 0)
+    with m.If(~inside["walk.work"] & ~inside["walk.found"]):
+        proof.claim((inside["walk.befores"] == 0) & (inside["walk.edges"] == 0))
 
     # Between two rows nothing is known of the one before but its brackets, and they nest.
     walked, walked_last = Signal(columns), Signal()  # the row in the walk
@@ -197,6 +200,7 @@ _OVERFLOW_BUGS = (
     Bug("the group that waits is looked up among the zones", Join, "lookup", lambda place, _: place[:-1]),
     Bug("always in the first place", Join, "decided.place", lambda *_: 0),
     Bug("the last row is a row like others", Walk, "last", lambda *_: 0),
+    Bug("a run of the row before is left", Walk, "befores", lambda runs, inside: runs | ~inside["work"]),
     Bug("a zone stays open", Walk, "before",
         lambda row, inside: Mux(inside["rows__ready"] & inside.component.rows.valid,
                                 inside.component.rows.payload.cells, row)),
