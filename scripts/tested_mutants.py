@@ -43,6 +43,10 @@ EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {
         "equivalent",
         "Once the walk of a row has ended, no run is left in it (proof *nothing overflows, nothing is left*).",
     ),
+    ("link/request.py", "8 -> 9"): (
+        "equivalent",
+        "Of the constant, which fits into eight bits, no further one is read.",
+    ),
 }
 """Of changes that no test notices, by file and text: whether they are ``equivalent``, or ``alive``; and why."""
 

@@ -5,9 +5,11 @@ import itertools
 import math
 
 import pytest
+from amaranth.sim import Simulator
 
 from contactfpga import Skin
 from contactfpga_hdl.debounce.even import Debounce
+from contactfpga_hdl.debounce.timed import TimedDebounce
 
 METHODS = ("sym_defer_pk", "asym_eager_defer_pk")
 SHEETS = ((1, 1), (1, 7), (7, 1), (13, 6), (3, 5), (2, 17))
@@ -164,3 +166,89 @@ def test_a_row_comes_out_as_many_clocks_later_as_it_has_columns_and_three(bench,
     assert [cycle for cycle, _ in sink.transfers] == [cycle + columns + 3 for cycle in source.transfers]
     gaps = {late - early for early, late in itertools.pairwise(source.transfers)}
     assert max(gaps) <= max(10, columns + 6), "each row is done before the Skin lets the next one come"
+
+
+UNEVEN = {"rows": 3, "columns": 4, "clock_hz": 12_000_000, "report": "cells"}
+SLOTS = Skin(**UNEVEN, scan="adaptive", settle_us=4.0)
+MICROSECONDS = Skin(**UNEVEN, scan="reversal", precharge_us=1.0, settle_us=2.0)
+
+
+def timed(method, press, release, samples):
+    """What one switch counts as, and whether a time is running, after each of its samples (time, level)."""
+    out, state, since, ignored_from = [], 0, None, None
+    for now, level in samples:
+        if ignored_from is not None and now - ignored_from < press:
+            out.append((1, True))
+            continue
+        ignored_from = None
+        if method == "asym_eager_defer_pk" and level > state:
+            state, since, ignored_from = 1, None, now if press else None
+        elif level == state:
+            since = None
+        else:
+            since = now if since is None else since
+            if now - since >= (release if state else press):
+                state, since = level, None
+        out.append((state, since is not None))
+    return out
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
+@pytest.mark.parametrize("skin", [SLOTS, MICROSECONDS], ids=["adaptive", "reversal"])
+@pytest.mark.whole
+def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, skin, method, press, release):
+    """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
+    if skin is SLOTS:
+        whole = 3 * round(skin.derived.row_clocks / 12)  # us of a scan
+        times = [max(0, (scans - 1) * 3 + 1) for scans in (press, release)]
+        skin = skin.replace(debounce=method, debounce_press_us=press * whole, debounce_release_us=release * whole)
+    else:
+        times = [us + 1 if us else 0 for us in (press, release)]
+        skin = skin.replace(debounce=method, debounce_press_us=press, debounce_release_us=release)
+    dut = TimedDebounce(skin)
+    frames, now, levels, taken = 120, 0, [0] * 12, []
+    for row in list(range(3)) * frames:
+        now += rng.randint(1, 2)
+        for column in range(4):
+            levels[4 * row + column] ^= rng.random() < rng.choice([0.02, 0.5])
+        taken.append((now, row, levels[4 * row : 4 * row + 4]))
+    cells = [
+        timed(method, *times, [(now, some[column]) for now, at, some in taken if at == row])
+        for row in range(3)
+        for column in range(4)
+    ]
+    got, busy = [], []
+
+    async def bench(ctx):
+        ctx.set(dut.rows.ready, 1)
+        ctx.set(dut.alone, 1)
+        for now, row, some in taken:
+            word = sum(level << column for column, level in enumerate(some))
+            ctx.set(dut.raw.payload, {"cells": word, "last": row == 2, **({"y": row} if skin.derived.skips else {})})
+            ctx.set(dut.now, now % 2 ** len(dut.now))
+            ctx.set(dut.raw.valid, 1)
+            while not (await ctx.tick().sample(dut.raw.ready))[-1]:
+                pass
+            ctx.set(dut.raw.valid, 0)
+            for _ in range(4 + 4):
+                _, _, valid, row_out = await ctx.tick().sample(dut.rows.valid, dut.rows.payload)
+                if valid:
+                    got.append((row_out.cells, row_out.last))
+            busy.append(ctx.get(dut.busy) >> row & 1)
+
+    simulator = Simulator(dut)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    wanted = [
+        (sum(cells[4 * row + column][frame][0] << column for column in range(4)), row == 2)
+        for frame in range(frames)
+        for row in range(3)
+    ]
+    assert got == wanted
+    assert busy == [
+        any(state or runs for state, runs in (cells[4 * row + column][frame] for column in range(4)))
+        for frame in range(frames)
+        for row in range(3)
+    ]

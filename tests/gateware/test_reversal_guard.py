@@ -210,6 +210,16 @@ def test_a_guard_column_that_is_stuck_is_told_alone_and_driven_no_more_until_the
     assert life.words[-1] == column_1
 
 
+def test_a_column_that_is_stuck_is_told_alone_until_a_retry_finds_it_free(bench, soon):
+    skin = small(rows=2, columns=2, project_us=2.0, **SLOW)
+    nothing, stuck = np.zeros((2, 2), bool), np.array([True, False, False])
+    life = live(bench, skin, Timeline([(40, nothing, stuck), (300, nothing, None)]), 1200)
+    assert set(life.words) == {0, 1 << 4}
+    assert life.words.index(1 << 4) < 40 + 3 * 32
+    assert life.words[300]
+    assert not life.words[-1]
+
+
 @pytest.mark.parametrize(("project_us", "clocks"), [(1.0, 43), (0.7, 36)])
 def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project_us, clocks):
     """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7

@@ -74,6 +74,7 @@ def test_what_is_left_to_the_campaign_is_there():
     assert {case.claim for case in QUICK} == {case.claim for case in CASES}
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("case", list(_cases_with_marks()))
 def test_the_claim_holds(case):
     verdict = case.run(limit_s=LONG_S if case.campaign else 200)

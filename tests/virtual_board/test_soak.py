@@ -16,6 +16,7 @@ def test_some_seconds_of_it(capsys):
     assert last.endswith(" 0 faults")
 
 
+@pytest.mark.slow  # a board is compiled for it
 def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
     first = []
 
@@ -29,6 +30,7 @@ def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
     assert "asked for a new frame" in capsys.readouterr().err
 
 
+@pytest.mark.slow  # on the same board
 def test_a_soak_without_a_frame_has_failed(capsys, monkeypatch):
     monkeypatch.setattr(soak, "SKIN", SLOW)
     assert soak.main(["--seconds", "0.000001"]) == 1
