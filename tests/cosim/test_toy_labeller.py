@@ -81,6 +81,7 @@ def test_it_runs_in_lockstep_with_its_golden_rule(run, scan):
     assert compare(predict(skin, timeline, CYCLES), run(skin, timeline, CYCLES)) > 100
 
 
+@pytest.mark.slow  # a board is compiled for it
 def test_the_virtual_board_and_the_driver_use_it():
     cells = np.zeros((4, 6), bool)
     cells[1, 2:5] = cells[2, 3] = True

@@ -169,6 +169,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     assert [file.name for file, key in changed.items() if key == now] == [file.name for file in others]
 
 
+@pytest.mark.slow  # of studies, whose tests are not among the quick ones either
 @pytest.mark.parametrize(
     ("module", "files"),
     [
