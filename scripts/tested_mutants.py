@@ -45,7 +45,7 @@ EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {
     ),
     ("link/request.py", "8 -> 9"): (
         "equivalent",
-        "Of the constant, which fits into eight bits, no further one is read.",
+        "The constant fits into eight bits, and `bit` selects one of these.",
     ),
 }
 """Of changes that no test notices, by file and text: whether they are ``equivalent``, or ``alive``; and why."""

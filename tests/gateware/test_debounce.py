@@ -193,62 +193,64 @@ def timed(method, press, release, samples):
     return out
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
-@pytest.mark.parametrize("skin", [SLOTS, MICROSECONDS], ids=["adaptive", "reversal"])
-@pytest.mark.whole
-def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, skin, method, press, release):
-    """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
-    if skin is SLOTS:
-        whole = 3 * round(skin.derived.row_clocks / 12)  # us of a scan
-        times = [max(0, (scans - 1) * 3 + 1) for scans in (press, release)]
-        skin = skin.replace(debounce=method, debounce_press_us=press * whole, debounce_release_us=release * whole)
-    else:
-        times = [us + 1 if us else 0 for us in (press, release)]
-        skin = skin.replace(debounce=method, debounce_press_us=press, debounce_release_us=release)
-    dut = TimedDebounce(skin)
-    frames, now, levels, taken = 120, 0, [0] * 12, []
-    for row in list(range(3)) * frames:
-        now += rng.randint(1, 2)
-        for column in range(4):
-            levels[4 * row + column] ^= rng.random() < rng.choice([0.02, 0.5])
-        taken.append((now, row, levels[4 * row : 4 * row + 4]))
-    cells = [
-        timed(method, *times, [(now, some[column]) for now, at, some in taken if at == row])
-        for row in range(3)
-        for column in range(4)
-    ]
-    got, busy = [], []
+def rows_alone(skin, taken):
+    """The debounce of uneven times, fed with rows (time, number, levels of four switches) that are driven alone: the
+    rows that leave it as (cells, last), and after each row whether that row is busy."""
+    dut, got, busy = TimedDebounce(skin), [], []
 
     async def bench(ctx):
         ctx.set(dut.rows.ready, 1)
         ctx.set(dut.alone, 1)
-        for now, row, some in taken:
-            word = sum(level << column for column, level in enumerate(some))
-            ctx.set(dut.raw.payload, {"cells": word, "last": row == 2, **({"y": row} if skin.derived.skips else {})})
+        for now, row, levels in taken:
+            ctx.set(dut.raw.payload.cells, packed(levels))
+            ctx.set(dut.raw.payload.last, row == 2)
+            if skin.derived.skips:
+                ctx.set(dut.raw.payload.y, row)
             ctx.set(dut.now, now % 2 ** len(dut.now))
             ctx.set(dut.raw.valid, 1)
             while not (await ctx.tick().sample(dut.raw.ready))[-1]:
                 pass
             ctx.set(dut.raw.valid, 0)
-            for _ in range(4 + 4):
-                _, _, valid, row_out = await ctx.tick().sample(dut.rows.valid, dut.rows.payload)
+            for _ in range(skin.columns + 4):
+                _, _, valid, left = await ctx.tick().sample(dut.rows.valid, dut.rows.payload)
                 if valid:
-                    got.append((row_out.cells, row_out.last))
+                    got.append((left.cells, left.last))
             busy.append(ctx.get(dut.busy) >> row & 1)
 
     simulator = Simulator(dut)
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
-    wanted = [
-        (sum(cells[4 * row + column][frame][0] << column for column in range(4)), row == 2)
-        for frame in range(frames)
-        for row in range(3)
-    ]
-    assert got == wanted
-    assert busy == [
-        any(state or runs for state, runs in (cells[4 * row + column][frame] for column in range(4)))
-        for frame in range(frames)
-        for row in range(3)
-    ]
+    return got, busy
+
+
+def packed(levels):
+    return sum(level << column for column, level in enumerate(levels))
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
+@pytest.mark.parametrize("skin", [SLOTS, MICROSECONDS], ids=["adaptive", "reversal"])
+def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, skin, method, press, release):
+    """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
+    if skin is SLOTS:
+        unit_us = 3 * round(skin.derived.row_clocks / 12)  # a scan
+        times = [max(0, (scans - 1) * 3 + 1) for scans in (press, release)]
+    else:
+        unit_us = 1
+        times = [us + 1 if us else 0 for us in (press, release)]
+    skin = skin.replace(debounce=method, debounce_press_us=press * unit_us, debounce_release_us=release * unit_us)
+    now, levels, taken = 0, [[0] * 4 for _ in range(3)], []
+    for row in list(range(3)) * 120:
+        now += rng.randint(1, 2)
+        levels[row] = [level ^ (rng.random() < rng.choice([0.02, 0.5])) for level in levels[row]]
+        taken.append((now, row, levels[row]))
+    rule = {
+        (row, column): iter(timed(method, *times, [(now, some[column]) for now, at, some in taken if at == row]))
+        for row, column in itertools.product(range(3), range(4))
+    }
+    wanted = [[next(rule[row, column]) for column in range(4)] for _, row, _ in taken]
+    got, busy = rows_alone(skin, taken)
+    assert got == [(packed(state for state, _ in some), row == 2) for (_, row, _), some in zip(taken, wanted)]
+    assert busy == [any(state or runs for state, runs in some) for some in wanted]

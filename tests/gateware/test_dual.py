@@ -45,7 +45,7 @@ class Core(wiring.Component):
 @pytest.mark.parametrize("said", [0b000, 0b011, 0b101], ids=["line", "rows", "contact"])
 @pytest.mark.parametrize("fail_safe", [False, True])
 def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, fail_safe):
-    # With 3 Mbaud it is the same, in as many bits as are needed, whether pauses are added or subtracted.
+    # At 3 Mbaud `scan - 2 * pause` and `scan + 2 * pause` are equal in the bits of the counter of the restart.
     skin = SMALL.replace(fail_safe=fail_safe, baud=2_400_000)
     first, second = Core(), Core()
     dut = Dual(skin, first, second)

@@ -30,7 +30,7 @@ def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
     assert "asked for a new frame" in capsys.readouterr().err
 
 
-@pytest.mark.slow  # on the same board
+@pytest.mark.slow  # a board is compiled for it
 def test_a_soak_without_a_frame_has_failed(capsys, monkeypatch):
     monkeypatch.setattr(soak, "SKIN", SLOW)
     assert soak.main(["--seconds", "0.000001"]) == 1

@@ -169,7 +169,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     assert [file.name for file, key in changed.items() if key == now] == [file.name for file in others]
 
 
-@pytest.mark.slow  # of studies, whose tests are not among the quick ones either
+@pytest.mark.slow  # the kept results are those of studies, whose tests `make test` leaves out
 @pytest.mark.parametrize(
     ("module", "files"),
     [

@@ -64,7 +64,7 @@ def assert_alike(boards):
     return sum(map(len, one.values()))
 
 
-@pytest.mark.slow  # what follows uses both boards more variously
+@pytest.mark.slow  # random frames and each call compare both boards in `make test`
 @pytest.mark.parametrize("name", sample(demo.RUNS, quick=["fingertip"], slow=["pushing", "around"]))
 def test_scenes_give_the_same_events(both, name):
     skin = demo.skin_of(name)
