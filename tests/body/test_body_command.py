@@ -64,7 +64,7 @@ def test_example_prints_contacts_in_the_base_frame(capsys):
     assert chest["normal"] == pytest.approx([1, 0, 0], abs=1e-5)
     assert cli.main(["body", example, "--joint", "L_ELBOW_P=-0.8", "--timeout", "60"]) == 0
     page = (Path(__file__).resolve().parents[2] / "docs" / "body.md").read_text(encoding="utf-8")
-    shown = page.split("with the left elbow bent by 0.8 rad:")[1].split("```")[1].strip()
+    shown = next(block.strip() for block in page.split("```") if block.startswith("\nleft_forearm: ok"))
     printed = re.sub(r"\d\.\d\d\d s old", "0.000 s old", capsys.readouterr().out).strip()
     assert printed == shown, "what the page shows"
     assert cli.main(["body", example, "--joint", "NECK=1"]) == 1
