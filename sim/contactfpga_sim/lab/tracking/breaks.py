@@ -24,9 +24,6 @@ WIDE = SKIN.replace(columns=60, settle_us=20.0)
 Y_MM = 73.0
 HZ = 1000.0
 
-MOST = 480
-"""Most placements per value; undecided ones break."""
-
 Ids = list[list[int]]
 """Ids from left to right by frame, without frames that lack a zone."""
 
@@ -51,18 +48,16 @@ class Knob:
     """Break points by formula, by method."""
     helps: str
 
-    def rates(
-        self, value: float, methods: Iterable[str], seed: int = 0, looks: Sequence[int] = rated.LOOKS
-    ) -> dict[str, rated.Rate]:
-        """Correct placements at a value, the same for each method; as many as the decision needs."""
+    def rates(self, value: float, methods: Iterable[str], seed: int = 0) -> dict[str, rated.Rate]:
+        """Correct placements at a value, the same for each method; as many as decide it. Undecided ones break."""
         hits = dict.fromkeys(methods, 0)
         found: dict[str, rated.Rate] = {}
-        for number in range(MOST):
+        for number in range(rated.LOOKS[-1]):
             frames = self.scene(value, np.random.default_rng([zlib.crc32(self.name.encode()), seed, number]))
             for method in hits.keys() - found.keys():
                 hits[method] += self.right(_ids(self.methods[method](), frames), value)
                 rate = rated.Rate(hits[method], number + 1)
-                if rate.of >= MOST or (rate.of in looks and rate.reaches(rated.LEVEL) is not None):
+                if rate.of == rated.LOOKS[-1] or (rate.of in rated.LOOKS and rate.reaches(rated.LEVEL) is not None):
                     found[method] = rate
             if len(found) == len(hits):
                 break
