@@ -162,7 +162,7 @@ MOVING = Knob(
     runs={
         "`raster`": Rated(functools.partial(_moving, REFERENCE, None), most=480),
         "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16), None), most=480),
-        "starter kit, 10 N": Rated(functools.partial(_moving, STARTER.skin, COVER), most=120),
+        "starter kit, 10 N": Rated(functools.partial(_moving, STARTER.skin, COVER), most=480),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
     unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is "
