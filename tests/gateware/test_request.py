@@ -102,6 +102,17 @@ def test_nothing_is_taken_before_the_first_delimiter(listen):
     assert listen(b"x" + sealed(plain(9)) + sealed(plain(10)))[0] == [(moment(19), 10, False)]
 
 
+@pytest.mark.parametrize("size", range(3, 9))
+@pytest.mark.parametrize("code", [1, 9])  # of a request, of a command
+def test_a_shorter_packet_with_a_check_that_leaves_nothing_is_not_taken(obey, code, size):
+    """After a request, whose kind is still known to fit."""
+    shorter = bytes(range(code, code + size - 2))
+    low, middle, high = check(shorter)
+    shorter += (low & 0x7F | (middle & 0x7F) << 7 | (high & 3) << 14).to_bytes(2, "little")
+    assert 0 not in shorter
+    assert obey(b"\0" + sealed(plain(9)) + shorter + b"\0") == [(9, False, None)]
+
+
 def test_the_number_is_gone_from_the_first_bit_of_the_next_packets(listen):
     _, numbers = listen(b"\0" + sealed(plain(77)) + sealed(plain(78))[:4])
     known = [cycle for cycle, number in enumerate(numbers) if number]
