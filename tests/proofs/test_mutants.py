@@ -197,6 +197,12 @@ def test_a_counter_reaches_what_it_counts_to_and_nothing_above(highest, tmp_path
     assert aig.reached(graph, nexts, equals(graph, bits, highest + 1), 10, tmp_path).outcome == "never"
 
 
+def test_a_prover_that_fails_says_what_yosys_says(monkeypatch, tmp_path):
+    monkeypatch.setattr(aig, "_SOME_GATE", "no netlist\n")
+    with pytest.raises(RuntimeError, match=r"status 1:\nERROR: .*: no"):
+        aig.reached(aig.Graph(1), {}, 2, 10, tmp_path)
+
+
 def test_a_graph_computes_what_its_gates_say():
     graph = aig.Graph(3)
     formula = graph.any([graph.differ(2, 5), graph.both(4, 6), 0])

@@ -309,7 +309,7 @@ _ALL = (
         "mutants",
         title="Mutants of the netlist that the comparison with the golden model tells",
         page="mutants.md",
-        minutes=90,
+        minutes=150,
         sections={
             "mutants": Section("tables:mutants_table", kept=r"^\| all", heads="^(?!stage)"),
             "options": Section("tables:options_table", kept=r"^\| all", heads="^(?!stage)"),

@@ -249,7 +249,8 @@ def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, fold
         return Answer("open")
     except subprocess.CalledProcessError as ended:
         if ended.returncode != -getattr(signal, "SIGXCPU", 0):
-            raise
+            said = (ended.stderr or ended.stdout).decode(errors="replace").strip()
+            raise RuntimeError(f"Yosys failed with status {ended.returncode}:\n{said[-3000:]}") from ended
         return Answer("open")
     if _output(merged) == b"0":
         return Answer("never")
