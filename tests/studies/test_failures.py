@@ -32,7 +32,7 @@ METHODS = [(name, method) for name, knob in KNOBS.items() for method in knob.run
 TOLD = {
     ("capacity", "any labeller"): {"overflow"},
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
-    ("settle", "40 kΩ pull-up, the same"): {"stuck"},
+    ("settle", "40 kΩ pull-up, the same"): {"stuck", "motion"},
     ("settle", "the same with guard lines"): {"row N open", "guard row open", "guard column open"},
     ("settle_reversal", "4.7 kΩ pull-up"): {"motion"},
     ("settle_reversal", "the same with guard lines"): {"motion", "guard row open"},
