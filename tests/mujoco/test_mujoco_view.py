@@ -288,10 +288,10 @@ def test_a_ball_is_dragged_in_the_way_of_three_arms():
         until(visitor, lambda: source.obstacle.kind == obstacle.BALL)
         visitor.page.wait_for_timeout(2000)
         before = source.obstacle.at_m
+        after = before + [-0.05, -0.05, 0.0]
         shift = shown.view.stage.at_m
-        visitor.drag_in_space(before + shift, before + shift + [-0.05, -0.05, 0.0])
-        until(visitor, lambda: np.linalg.norm(source.obstacle.at_m - before) > 0.04)
+        visitor.drag_in_space(before + shift, after + shift)
+        until(visitor, lambda: np.allclose(source.obstacle.at_m, after, rtol=0, atol=0.02))
         visitor.page.mouse.up()
-        assert source.obstacle.at_m == pytest.approx(before + [-0.05, -0.05, 0.0], abs=0.02)
         until(visitor, lambda: source.copies and all(copy.most_n["arm"] for copy in source.copies))
         visitor.page.wait_for_selector("text=ms since the touch")
