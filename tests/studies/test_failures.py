@@ -32,7 +32,7 @@ METHODS = [(name, method) for name, knob in KNOBS.items() for method in knob.run
 TOLD = {
     ("capacity", "any labeller"): {"overflow"},
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
-    ("settle", "40 kΩ pull-up, the same"): {"stuck"},
+    ("settle", "40 kΩ pull-up, the same"): {"stuck", "motion"},
     ("settle", "the same with guard lines"): {"row N open", "guard row open", "guard column open"},
     ("settle_reversal", "4.7 kΩ pull-up"): {"motion"},
     ("settle_reversal", "the same with guard lines"): {"motion", "guard row open"},
@@ -325,7 +325,7 @@ def test_a_row_is_missed_where_its_switches_do_not_lift_it_to_vih(turn):
 def test_a_bounce_is_seen_once_it_lasts_longer_than_the_release_time(turn, method):
     found = turn("bounce", f"`{method}`")
     assert between(found, touch.debounced(method).derived.skin.debounce_release_us)
-    assert max(outcome.amount for outcome in found.outcomes) == 2
+    assert {outcome.what for outcome in found.outcomes if not outcome.right} == {"2 touches of 1"}
 
 
 @pytest.mark.campaign
@@ -376,7 +376,7 @@ def test_a_noisy_line_never_makes_a_frame(turn):
     found = turn("noise", "half a bit to two bits long")
     assert not any("never sent" in outcome.what for outcome in found.outcomes)
     shares = [outcome.amount for outcome in found.outcomes]
-    assert shares == sorted(shares, reverse=True)
+    assert max(np.diff(shares)) < 0.05  # 120 draws may decide
     assert (shares[0], shares[-1]) == (1, 0)
 
 

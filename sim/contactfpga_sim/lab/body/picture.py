@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga import examples
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.bodies import BodySource, BodyView
-from contactfpga.tools.view.cameras import Side, fitted
+from contactfpga.tools.view.cameras import Placed, Side, fitted
 from contactfpga_sim.lab.view import browser
 
 SIZE = 1120, 660
@@ -20,6 +20,8 @@ SIDE = Side(np.array([0.9, 0.3, 0.3]), np.array([0.0, 0.0, 1.0]))
 LOWEST_M = -0.05
 """Height of the hips in the base frame."""
 SETTLED_MS = 3000
+TRIES = 10
+"""The view refits its camera when the panel has changed the canvas, on a busy machine late."""
 
 
 def draw(folder: Path) -> Path:
@@ -34,14 +36,19 @@ def draw(folder: Path) -> Path:
         visitor.page.wait_for_timeout(SETTLED_MS)
         (client,) = shown.web.get_clients().values()
         points_m = shown.view.stage.points_m()
-        _look(client.camera, points_m[points_m[:, 2] > LOWEST_M])
-        visitor.page.wait_for_timeout(SETTLED_MS)
+        placed = fitted(points_m[points_m[:, 2] > LOWEST_M], SIDE, client.camera.aspect, client.camera.fov)
+        for _ in range(TRIES):
+            _look(client.camera, placed)
+            visitor.page.wait_for_timeout(SETTLED_MS)
+            if np.allclose(client.camera.position, placed.position, atol=1e-3):
+                break
+        else:
+            raise TimeoutError("the page's camera does not stay where it was put: is the machine busy?")
         visitor.page.screenshot(path=str(image))
     return image
 
 
-def _look(camera: Any, points_m: np.ndarray) -> None:
-    placed = fitted(points_m, SIDE, camera.aspect, camera.fov)
+def _look(camera: Any, placed: Placed) -> None:
     with camera.client.atomic():
         camera.up_direction = SIDE.up
         camera.position, camera.look_at = placed.position, placed.look_at
