@@ -159,7 +159,7 @@ def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypat
     """With real sizes and times."""
     monkeypatch.undo()  # what was synthesized before is kept
     text = (ROOT / "examples" / "scenes-bumper.toml").read_text()
-    limits = {"barycenter_mm": 3.0, "latency_us": 500.0, "pitches": None, "quick": True}
+    limits = {"barycenter_mm": 3.0, "latency_us": 500.0, "pitches": (10.0,), "quick": True}
     one, two = chosen(file(text), **limits), chosen(file(APART + text + SECOND), **limits)
     assert one.answer.skin == Skin(labeller="single")
     assert two.answer.skin == Skin(labeller="serial")

@@ -132,6 +132,14 @@ def test_constant_velocity_goes_on_where_its_speed_puts_it():
         assert found == ids
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_contact_keeps_its_id_however_slow_the_frames_are(name):
+    cells = np.zeros((16, 16), bool)
+    cells[5, 5] = True
+    update = scores.TRACKERS[name]()
+    assert [list(update(scenes.zones_of(cells, 200_000 * number)[0])) for number in range(3)] == [[1]] * 3
+
+
 def scored(each, counted):
     """Scenes with these scores, that count for so much."""
     known = [(one, count) for one, count in zip(each, counted) if count]

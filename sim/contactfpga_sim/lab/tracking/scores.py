@@ -53,17 +53,20 @@ class Nearest:
 
 
 class ConstantVelocity:
-    """Baseline that extrapolates speed for 0.1 s, and matches zones by least total distance."""
+    """Baseline that extrapolates speed for 0.1 s, at least one frame, and matches zones by least total distance."""
 
     def __init__(self, gate_mm: float = 20.0, coast_s: float = 0.1, smooth_s: float = 0.02):
         self._gate_mm, self._coast_s, self._smooth_s = gate_mm, coast_s, smooth_s
         self._seen: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
         """Time, place and speed of each id when last seen."""
+        self._before = -math.inf  # time of the last frame
         self._next_id = 1
 
     def update(self, zones: Zones) -> dict[int, Place]:
         now = zones.time_us / 1e6
-        self._seen = {name: one for name, one in self._seen.items() if now - one[0] <= self._coast_s}
+        since = max(self._coast_s, now - self._before)
+        self._seen = {name: one for name, one in self._seen.items() if now - one[0] <= since}
+        self._before = now
         places = np.array([(zone.x_mm, zone.y_mm) for zone in zones if zone.x_mm is not None]).reshape(-1, 2)
         ahead = np.array([place + speed * (now - then) for then, place, speed in self._seen.values()]).reshape(-1, 2)
         names = dict(zip(places_of(ahead, places, self._gate_mm), self._seen))
