@@ -36,9 +36,9 @@ def draw(folder: Path) -> Path:
         visitor.page.wait_for_timeout(SETTLED_MS)
         (client,) = shown.web.get_clients().values()
         points_m = shown.view.stage.points_m()
-        placed = fitted(points_m[points_m[:, 2] > LOWEST_M], SIDE, client.camera.aspect, client.camera.fov)
+        shown_m = points_m[points_m[:, 2] > LOWEST_M]
         for _ in range(TRIES):
-            _look(client.camera, placed)
+            placed = _look(client.camera, shown_m)
             visitor.page.wait_for_timeout(SETTLED_MS)
             if np.allclose(client.camera.position, placed.position, atol=1e-3):
                 break
@@ -48,7 +48,9 @@ def draw(folder: Path) -> Path:
     return image
 
 
-def _look(camera: Any, placed: Placed) -> None:
+def _look(camera: Any, points_m: np.ndarray) -> Placed:
+    placed = fitted(points_m, SIDE, camera.aspect, camera.fov)
     with camera.client.atomic():
         camera.up_direction = SIDE.up
         camera.position, camera.look_at = placed.position, placed.look_at
+    return placed
