@@ -293,5 +293,6 @@ def test_a_ball_is_dragged_in_the_way_of_three_arms():
         visitor.drag_in_space(before + shift, after + shift)
         until(visitor, lambda: np.allclose(source.obstacle.at_m, after, rtol=0, atol=0.02))
         visitor.page.mouse.up()
+        assert source.obstacle.at_m == pytest.approx(after, abs=0.02), "it stays where it was left"
         until(visitor, lambda: source.copies and all(copy.most_n["arm"] for copy in source.copies))
         visitor.page.wait_for_selector("text=ms since the touch")

@@ -133,7 +133,7 @@ def test_constant_velocity_goes_on_where_its_speed_puts_it():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_contact_keeps_its_id_however_slow_the_frames_are(name):
+def test_a_contact_keeps_its_id_at_five_frames_per_second(name):
     cells = np.zeros((16, 16), bool)
     cells[5, 5] = True
     update = scores.TRACKERS[name]()

@@ -230,7 +230,8 @@ class Answer:
 def reached(graph: Graph, nexts: Mapping[int, int], bad: int, limit_s: int, folder: Path) -> Answer:
     """Whether ``bad`` can come to hold, from power-up, with any inputs.
 
-    Arguments are as in :func:`write`; ``limit_s``: seconds of one processor.
+    Arguments are as in :func:`write`; ``limit_s``: seconds of one processor. Raises RuntimeError with Yosys' message
+    if Yosys fails.
     """
     if bad == 0:
         return Answer("never")

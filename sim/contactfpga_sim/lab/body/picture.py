@@ -43,7 +43,7 @@ def draw(folder: Path) -> Path:
             if np.allclose(client.camera.position, placed.position, atol=1e-3):
                 break
         else:
-            raise TimeoutError("the page's camera does not stay where it was put: is the machine busy?")
+            raise TimeoutError(f"the page's camera moved after each of {TRIES} tries; draw again on an idle machine")
         visitor.page.screenshot(path=str(image))
     return image
 
