@@ -84,13 +84,9 @@ def test_frames_of_successive_batches_are_numbered_on():
         batches = [board.batch() for _ in range(3)]
     sent = [sequence for batch in batches for sequence in batch.frames["sequence"].tolist()]
     assert len(sent) > len(batches) == 3
-    for method in ("to_pandas", "to_arrow"):
-        tables = [getattr(batch, method)() for batch in batches]
-        numbers = [
-            list(map(int, table["frame"].tolist() if method == "to_pandas" else table["frame"].to_pylist()))
-            for table in tables
-        ]
-        assert sorted({number for one in numbers for number in one}) == list(range(len(sent)))
+    for tables in ([batch.to_arrow().to_pandas() for batch in batches], [batch.to_pandas() for batch in batches]):
+        numbers = [number for table in tables for number in table["frame"].tolist()]
+        assert sorted(set(numbers)) == list(range(len(sent)))
     assert [int(batch.zones["frame"][0]) for batch in batches] == [0, 0, 0]
 
 
