@@ -127,7 +127,10 @@ def test_it_is_iterated_as_a_board_is(patient):
 
 def test_batch_holds_each_frame_of_each_link_once(patient):
     with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
-        batch = body.batch(0.05, LONG)
+        batch, later = body.batch(0.05, LONG), body.batch(0.05, LONG)
+    assert {name: one.first for name, one in later.links.items()} == {
+        name: len(one) for name, one in batch.links.items()
+    }
     assert len(batch) > 1
     assert [one.host_time_s for one in batch] == sorted(one.host_time_s for one in batch)
     assert set(batch.links) == {"arm", "chest"}

@@ -382,7 +382,7 @@ def test_the_page_on_security_states_these_limits():
         "URDF": (urdf.MAX_BYTES // 10**6, xmlfile.MAX_ELEMENTS, urdf.MAX_LINKS),
         "Mesh of a robot": (mesh_file.MAX_BYTES // 10**6, mesh_file.MAX_TRIANGLES),
         "Recording (MCAP)": (
-            *(mcap.LARGEST >> 20, mcap.UNPACKED >> 20, mcap.FREE >> 10, mcap.RATIO),
+            *(mcap.LARGEST >> 20, mcap.FREE >> 20, mcap.RATIO, mcap.LEAST >> 10),
             *(mcap.MAX_LINKS, mcap.MAX_NAME, mcap.MAX_TEXTS),
         ),
         "Frames": (array_file.MAX_BYTES >> 30,),

@@ -1,5 +1,6 @@
 """Recordings from strangers: what is packed in them costs no more memory and time than the limits say."""
 
+import contextlib
 import struct
 import subprocess
 import sys
@@ -35,14 +36,15 @@ from contactfpga import Skin
 from contactfpga.driver.mcap import (
     FREE,
     KIND,
+    LARGEST,
     MAGIC,
     MAX_LINKS,
     MAX_NAME,
     MAX_TEXTS,
-    UNPACKED,
     RecordingError,
+    Unpacker,
     Unreadable,
-    inside,
+    parsed,
 )
 from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.recordings.mcap_file import McapFile
@@ -57,6 +59,10 @@ status = cli.main(sys.argv[1:])
 print(re.search(r"VmHWM:\\s*(\\d+) kB", open("/proc/self/status").read())[1])
 sys.exit(status)"""
 """Prints the most memory it took in KiB; what ``getrusage`` says counts that of the process that started it, too."""
+
+
+def inside(one):
+    return Unpacker(FREE).inside(one)
 
 
 def record(one):
@@ -79,8 +85,8 @@ def packed(compression, size):
     return b"".join(pieces)
 
 
-def chunk(compression, size, declared=None):
-    data = packed(compression, size)
+def chunk(compression, size, declared=None, data=None):
+    data = packed(compression, size) if data is None else data
     return Chunk(compression, data, 5, 5, 0, size if declared is None else declared)
 
 
@@ -101,8 +107,13 @@ def mcap(chunks, links=("a",), texts=(), repeat=1, in_summary=()):
         body += data
     body += record(DataEnd(0))
     end = record(schema) + b"".join(map(record, channels)) + index + b"".join(map(record, in_summary))
-    end += record(Statistics(0, len(channels), {}, len(chunks), 1, 5, 5, len(texts), 1))
+    end += record(Statistics(0, len(channels), {}, repeat * len(chunks), 1, 5, 5, len(texts), 1))
     return body + end + record(Footer(len(body), 0, 0)) + MAGIC
+
+
+def tiny(count):
+    """A chunk of the smallest records, of a kind that nobody knows."""
+    return chunk("zstd", count * 9, data=zstandard.compress((b"\x7f" + bytes(8)) * count))
 
 
 BOMBS = {
@@ -111,8 +122,8 @@ BOMBS = {
     "zstd that says little": lambda: mcap([chunk("zstd", BIG, 1000)]),
     "lz4 that says little": lambda: mcap([chunk("lz4", BIG, 1000)]),
     "zstd that says all": lambda: mcap([chunk("zstd", 1000, BIG)]),
-    "one chunk many times": lambda: mcap([chunk("zstd", UNPACKED)], repeat=100),
-    "many chunks": lambda: mcap([chunk("zstd", UNPACKED)] * 60),
+    "one chunk many times": lambda: mcap([chunk("zstd", 1 << 23)], repeat=100),
+    "many chunks": lambda: mcap([chunk("zstd", 1 << 23)] * 60),
 }
 
 
@@ -130,14 +141,28 @@ def test_a_bomb_is_refused_by_all_that_read_it(tmp_path, name):
             lambda: Recording(path).skins,
             lambda: contactfpga.open(f"replay://{path}", timeout=1).read(),
             lambda: contactfpga.open(f"replay://{path}?pace=1000", timeout=1).read(),
-            lambda: recover(path),
         ):
             with pytest.raises(contactfpga.ContactFPGAError):
                 use()
+        # What is within the limits is kept.
+        with contextlib.suppress(contactfpga.ContactFPGAError):
+            found = recover(path)
+            assert found.messages < 20
+            found.path.unlink()
         assert tracemalloc.get_traced_memory()[1] < PEAK
     finally:
         tracemalloc.stop()
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("use", [lambda path: list(Recording(path).raw_bytes()), recover])
+def test_very_many_small_records_are_not_all_looked_at(tmp_path, use):
+    """Each takes time, and what packs them well holds millions in a small file."""
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(mcap([tiny(14_000)] * 50))
+    assert path.stat().st_size < 20_000
+    with pytest.raises(RecordingError, match=r"unpacks to more than \d+ MiB|pieces above 64 MiB, or beyond"):
+        use(path)
 
 
 @pytest.mark.slow
@@ -176,9 +201,9 @@ def test_a_bomb_at_the_end_of_a_file_is_passed_over(tmp_path):
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
-@pytest.mark.parametrize("size", [100, 5_000, FREE])
+@pytest.mark.parametrize("size", [100, 5_000, LARGEST])
 def test_a_chunk_within_the_limits_is_read(compression, size):
-    (found,) = inside(chunk(compression, size))
+    (found,) = map(parsed, inside(chunk(compression, size)))
     assert isinstance(found, Message)
     assert found.data == bytes(size - 31)
 
@@ -225,7 +250,7 @@ def test_very_many_texts_are_refused(tmp_path):
     path = tmp_path / "x.mcap"
     texts = [Metadata("contactfpga", {"link": str(number)}) for number in range(MAX_TEXTS + 1)]
     path.write_bytes(mcap([chunk("zstd", 1000)], texts=texts))
-    with pytest.raises(RecordingError, match="damaged"):
+    with pytest.raises(RecordingError, match=f"has {MAX_TEXTS + 1:,} texts; the limit is {MAX_TEXTS:,}"):
         Recording(path)
 
 

@@ -7,13 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from model_board import ModelBoard
 from recorded_stream import StreamPort, recorded
 
 import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings import Recording, recorder
 from contactfpga.tools.recordings.export import COLUMNS, pieces
+from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.protocol import Frame, no_records
 
 
@@ -77,6 +79,27 @@ def test_csv(file, tmp_path):
         head, *rows = csv.reader(opened)
     assert head == list(COLUMNS)
     same([(float(r[0]), r[1], *map(int, r[2:6]), *map(float, r[6:9])) for r in rows], file)
+
+
+def test_bytes_that_could_not_be_used_are_counted(tmp_path, capsys):
+    board = ModelBoard(Skin())
+    hello, frames = board.hello(), [board.frame() for _ in range(20)]
+    broken = bytes([frames[5][0] ^ 1]) + frames[5][1:]
+    file = McapFile(tmp_path / "x.mcap")
+    for link, data in (
+        ("whole", hello + b"".join(frames)),
+        ("late", b"".join(frames[:3]) + hello + b"".join(frames[3:])),
+        ("damaged", hello + b"".join([*frames[:5], broken, *frames[6:]])),
+        ("deaf", b"".join(frames)),
+    ):
+        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
+    file.close()
+    assert cli.main(["export", str(tmp_path / "x.mcap"), str(tmp_path / "x.csv")]) == 0
+    said = [
+        line.split(" bytes could not be used")[0] for line in capsys.readouterr().out.splitlines() if "used" in line
+    ]
+    sizes = {"late": frames[:3], "damaged": frames[5:6], "deaf": frames}
+    assert sorted(said) == sorted(f"{link}: {len(b''.join(lost)):,}" for link, lost in sizes.items())
 
 
 def test_pieces_are_one_table(file):

@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 from fake_board import FakeBoard, wait_until
+from mcap.reader import make_reader
 from model_board import ModelBoard
-from recorded_stream import NAMES, StreamPort, recorded_both
+from recorded_stream import NAMES, StreamPort, recorded, recorded_both, rewritten
 from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin
 from contactfpga.robot.body import Body
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, Session
+from contactfpga.tools.recordings import Recording, Session, recorder
+from contactfpga.tools.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings.recover import recover
 from contactfpga.wire.hello import Cutter
 
 SKIN = Skin()
@@ -61,9 +64,6 @@ def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):
-    from contactfpga.tools.recordings import recorder
-    from contactfpga.tools.recordings.mcap_file import McapFile
-
     file = McapFile(tmp_path / "x.mcap")
     for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
         file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
@@ -76,9 +76,6 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
 
 def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
     """And not in that in which their boards spoke."""
-    from contactfpga.tools.recordings import recorder
-    from contactfpga.tools.recordings.mcap_file import McapFile
-
     file = McapFile(tmp_path / "x.mcap")
     for link in ("arm", "leg", "chest"):
         file.metadata("contactfpga", {"link": link})
@@ -95,6 +92,80 @@ def test_two_links_of_one_name(tmp_path):
         session.add(StreamPort(), name="arm")
         with pytest.raises(contactfpga.ContactFPGAError, match="two links are named 'arm'"):
             session.start()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("左腕", "右腕", "__"), ("arm 1", "arm-1", "arm_1_2", "arm_1"), ("1", "_1", "", "_")],
+)
+@pytest.mark.parametrize("bytes_only", [True, False])
+def test_links_whose_names_become_one_topic_are_apart(tmp_path, names, bytes_only):
+    ports = [StreamPort(frames=50 + 10 * number) for number in range(len(names))]
+    with Session(tmp_path / "x.mcap", bytes_only=bytes_only) as session:
+        for name, port in zip(names, ports):
+            session.add(port, name=name)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
+    found = recover(tmp_path / "x.mcap")
+    for file in (tmp_path / "x.mcap", found.path):
+        recording = Recording(file)
+        assert list(recording.links) == list(names)
+        for name, port in zip(names, ports):
+            assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
+    with open(tmp_path / "x.mcap", "rb") as file:
+        channels = make_reader(file).get_summary().channels.values()
+    owners = {(channel.topic, channel.metadata["link"]) for channel in channels if channel.topic != "/tf"}
+    assert len(dict(owners)) == len(owners) == len(names) * (1 if bytes_only else 4), "each topic has one link"
+
+
+@pytest.mark.parametrize("name", ["x" * 257, None])
+def test_what_could_not_be_read_again_is_not_recorded(tmp_path, name):
+    with Session(tmp_path / "x.mcap") as session:
+        for number in range(1 if name else 65):
+            session.add(StreamPort(frames=1), name=name or str(number))
+        with pytest.raises(contactfpga.ContactFPGAError, match="at most 64 links, with names of 256 characters"):
+            session.start()
+
+
+@pytest.fixture
+def both(tmp_path, monkeypatch):
+    """Two boards of one name that were recorded at the same time, each in a file."""
+    monkeypatch.setattr(recorder, "_epoch_ns", lambda board: 10**18)
+    ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200)]
+    for number, port in enumerate(ports):
+        recorded(tmp_path, port, name=f"{number}.mcap", bytes_only=True)
+    return ports, [tmp_path / "0.mcap", tmp_path / "1.mcap"]
+
+
+def test_merged_boards_of_one_name_are_named_by_their_topics(tmp_path, both):
+    ports, files = both
+    rewritten(tmp_path / "x.mcap", *files, rename="/robot2")
+    recording = Recording(tmp_path / "x.mcap")
+    assert len(recording.links) == 2
+    for name, port, rows in zip(("/left_hand/bytes", "/robot2/left_hand/bytes"), ports, (16, 8)):
+        assert recording.links[name].sheet.rows == rows
+        assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_merged_boards_of_one_topic_are_refused(tmp_path, both, capsys, apart):
+    rewritten(tmp_path / "x.mcap", *both[1], apart=apart)
+    for file in (tmp_path / "x.mcap", recover(tmp_path / "x.mcap").path):
+        assert cli.main(["export", str(file), str(tmp_path / "x.csv")]) == 1
+        assert "mixes bytes of several boards named 'left hand'" in " ".join(capsys.readouterr().err.split())
+        assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_recordings_one_after_the_other_may_be_merged(tmp_path, monkeypatch, apart):
+    files, sent = [tmp_path / f"{number}.mcap" for number in range(3)], b""
+    for number, file in enumerate(files):
+        monkeypatch.setattr(recorder, "_epoch_ns", lambda board, number=number: 10**18 + number * 10**10)
+        port = StreamPort(frames=100 * (number + 1))
+        recorded(tmp_path, port, name=file.name, bytes_only=True)
+        sent += port.sent
+    rewritten(tmp_path / "x.mcap", *files, apart=apart)
+    assert b"".join(data for _, data in Recording(tmp_path / "x.mcap").raw_bytes()) == sent
 
 
 ROBOT = """

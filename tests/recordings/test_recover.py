@@ -2,6 +2,7 @@
 
 import os
 import resource
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,10 +11,14 @@ import time
 
 import pytest
 from fake_board import FakeBoard, wait_until
+from mcap.reader import make_reader
+from mcap.writer import IndexType
 from model_board import ModelBoard
+from recorded_stream import NAMES, recorded_both, rewritten
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.driver import mcap
 from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile, RecordingFailed
@@ -178,7 +183,8 @@ def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
         with Sender(board, frames, 0.002):
             _, errors = process.communicate(timeout=LONG)
     assert process.returncode == 1
-    assert f"{file}: there is no room for more (File too large); the 0.0 MB that are there are whole" in errors
+    whole = f"the {file.stat().st_size:,} bytes that are there are whole"
+    assert f"{file}: there is no room for more (File too large); {whole}" in errors
     assert f"contactfpga record --recover {file}" in errors
     assert "Traceback" not in errors
     assert 1000 < file.stat().st_size <= limit
@@ -207,6 +213,67 @@ def test_a_piece_that_does_not_fit_leaves_no_part(tmp_path, monkeypatch):
     assert (tmp_path / "x.mcap").read_bytes() == whole
 
 
+@pytest.mark.parametrize("limit", [0, 1000])
+def test_a_full_disk_before_the_first_message_leaves_no_file(tmp_path, limit):
+    """There would be nothing in it to recover."""
+    file = tmp_path / "x.mcap"
+    with FakeBoard(SKIN) as board:
+        process = record(file, board.path, preexec_fn=limited(limit), env=UNKEPT)
+        _, errors = process.communicate(timeout=LONG)
+    assert process.returncode == 1
+    assert "nothing was recorded. Make room, then record again" in " ".join(errors.split())
+    assert "--recover" not in errors
+    assert not file.exists()
+
+
+# ---- what other programs write
+
+UNREPEATED = {"repeat_channels": False, "repeat_schemas": False}
+WAYS = {
+    "no chunks": {"use_chunking": False},
+    "no index": {"index_types": IndexType.NONE},
+    "no statistics": {"use_statistics": False},
+    "no repetition": UNREPEATED,
+    "no summary": {**UNREPEATED, "index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False},
+    "large chunks": {"chunk_size": 1 << 25},
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_whole_files_are_read_however_they_are_written(tmp_path, capsys, way):
+    ports, _ = recorded_both(tmp_path / "x.mcap")
+    file = tmp_path / "other.mcap"
+    rewritten(file, tmp_path / "x.mcap", **WAYS[way])
+    assert cli.main(["record", "--recover", str(file)]) == 0
+    assert f"Nothing is missing: {file}" in " ".join(capsys.readouterr().out.split())
+    times = [t_s for t_s, _, _ in Recording(tmp_path / "x.mcap").frames(0.1, 0.2)]
+    assert times
+    for path in (file, tmp_path / "other_recovered.mcap"):
+        recording = Recording(path)
+        assert recording.skins == Recording(tmp_path / "x.mcap").skins
+        for name, port in zip(NAMES, ports):
+            assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
+        assert [t_s for t_s, _, _ in recording.frames(0.1, 0.2)] == times
+
+
+def test_what_is_too_large_is_named_and_the_rest_is_kept(tmp_path, capsys, monkeypatch):
+    """With a lower limit, that a test may reach."""
+    recorded_both(tmp_path / "x.mcap")
+    rewritten(tmp_path / "large.mcap", tmp_path / "x.mcap", chunk_size=1 << 18)
+    with open(tmp_path / "large.mcap", "rb") as file:
+        sizes = [one.uncompressed_size for one in make_reader(file).get_summary().chunk_indexes]
+    monkeypatch.setattr(mcap, "LARGEST", sizes[0] - 1)
+    assert sizes[-1] < sizes[0]
+    assert cli.main(["export", str(tmp_path / "large.mcap"), str(tmp_path / "x.csv")]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "large.mcap has a chunk of 0.3 MiB; the limit is 0 MiB; write it with smaller chunks" in said
+    assert "damaged" not in said
+    assert cli.main(["record", "--recover", str(tmp_path / "large.mcap")]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"Left out: {sum(size >= sizes[0] for size in sizes)} pieces above" in out
+    assert "Nothing is missing" not in out
+
+
 # ---- damage
 
 
@@ -225,8 +292,6 @@ def closed(tmp_path):
 
 
 def read(path):
-    from mcap.reader import make_reader
-
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         texts = [one.metadata for one in reader.iter_metadata()]
@@ -264,6 +329,21 @@ def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys, numbe
     assert read(tmp_path / "new.mcap")[0] == messages[: 2 * number] + messages[2 * number + 2 :]
 
 
+@pytest.mark.parametrize("number", range(4))
+def test_a_damaged_size_costs_one_piece(closed, tmp_path, number):
+    """The index says where the next one begins."""
+    path, messages, _ = closed
+    with open(path, "rb") as file:
+        at = [one.chunk_start_offset for one in make_reader(file).get_summary().chunk_indexes][number]
+    for wrong in (b"\xff", b"\0"):
+        data = bytearray(path.read_bytes())
+        data[at + 2 : at + 3] = wrong
+        (tmp_path / "x.mcap").write_bytes(data)
+        found = recover(tmp_path / "x.mcap", tmp_path / f"new{wrong[0]}.mcap")
+        assert found.damaged > 0
+        assert read(found.path)[0] == messages[: 2 * number] + messages[2 * number + 2 :]
+
+
 @pytest.mark.parametrize("cut", [5, 30, 100])
 def test_a_file_that_ends_within_its_index_is_not_called_whole(closed, tmp_path, capsys, cut):
     """All messages are there, and yet it cannot be read as it is."""
@@ -286,15 +366,18 @@ def recording(path, link, data):
 
 
 def topics(path):
-    from mcap.reader import make_reader
-
     with open(path, "rb") as file:
         return [(channel.topic, message.data) for _, channel, message in make_reader(file).iter_messages()]
 
 
 def test_two_recordings_in_one_file_are_both_recovered(closed, tmp_path, capsys):
     path, messages, _ = closed
+    path = path.rename(tmp_path / "two in one.mcap")
     path.write_bytes(path.read_bytes() + recording(tmp_path / "b.mcap", "b", b"second"))
+    with pytest.raises(contactfpga.ContactFPGAError) as refused:
+        contactfpga.open(f"replay://{path}")
+    join = shlex.join(["contactfpga", "record", "--recover", str(path)])
+    assert str(refused.value) == f"{path} holds several recordings, one after the other; join them with: {join}"
     assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert f"{path} holds 2 recordings, one after the other; the new file has them all." in out
@@ -322,7 +405,7 @@ def test_a_recording_behind_one_that_was_not_closed_is_recovered(closed, tmp_pat
     path, messages, ends = closed
     path.write_bytes(path.read_bytes()[: ends[1]] + recording(tmp_path / "b.mcap", "b", b"second"))
     found = recover(path, tmp_path / "new.mcap")
-    assert (found.recordings, found.closed) == (2, False)
+    assert (found.recordings, found.usable) == (2, False)
     assert topics(found.path) == [*(("/a", data) for data in messages[:4]), ("/b", b"second")]
 
 
@@ -334,18 +417,6 @@ def test_bytes_behind_the_end_are_counted(closed, tmp_path, capsys):
     assert "Nothing is missing" not in out
     assert "Left out after the end: 1,234 bytes that are no recording." in out
     assert read(tmp_path / "new.mcap")[0] == messages
-
-
-def test_messages_outside_of_chunks_are_copied(tmp_path):
-    """Other programs write such files."""
-    from mcap.writer import Writer
-
-    with open(tmp_path / "x.mcap", "wb") as file:
-        writer = Writer(file, use_chunking=False)
-        writer.start()
-        writer.add_message(writer.register_channel("/a", "cdr", 0), 5, b"abc", 5)
-        writer.finish()
-    assert read(recover(tmp_path / "x.mcap").path)[0] == [b"abc"]
 
 
 def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):

@@ -1,6 +1,11 @@
 """A board that sends a stream, and a recording of it."""
 
+import contextlib
+from operator import itemgetter
+
 from fake_board import wait_until
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from model_board import ModelBoard
 
 import contactfpga
@@ -66,6 +71,27 @@ def recorded_both(file, **options):
         session.start()
         wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
     return ports, session
+
+
+def rewritten(target, *sources, rename="", apart=False, **options):
+    """Write all messages of some files by time, and their texts, with the library's writer. ``rename`` goes before the
+    topics of all but the first. ``apart``: each has channels of its own, and messages have no sequence."""
+    with contextlib.ExitStack() as opened, open(target, "wb") as new:
+        readers = [make_reader(opened.enter_context(open(source, "rb"))) for source in sources]
+        found = [(m.log_time, n, s, c, m) for n, reader in enumerate(readers) for s, c, m in reader.iter_messages()]
+        writer, known = Writer(new, **options), {}
+        writer.start()
+        for text in (text for reader in readers for text in reader.iter_metadata()):
+            writer.add_metadata(text.name, text.metadata)
+        for _, number, schema, channel, message in sorted(found, key=itemgetter(0)):
+            topic = (rename if number else "") + channel.topic
+            key = topic, number if apart else 0
+            if key not in known:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                known[key] = writer.register_channel(topic, channel.message_encoding, kind, channel.metadata)
+            sequence = 0 if apart else message.sequence
+            writer.add_message(known[key], message.log_time, message.data, message.publish_time, sequence)
+        writer.finish()
 
 
 def replayed(file):

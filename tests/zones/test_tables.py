@@ -8,6 +8,7 @@ from wire import Wire
 import contactfpga
 from contactfpga.driver.conversation import Conversation
 from contactfpga.zones.batch import Batch
+from contactfpga_sim import VirtualBoard
 
 PLANE = contactfpga.Skin(rows=12, columns=20, pitch_x_mm=4.0, settle_us=20.0)
 SHEETS = {
@@ -72,6 +73,21 @@ def test_a_row_for_each_zone(name):
     rows = [{"frame": index, **row} for index, zones in enumerate(frames) for row in expected(zones)]
     batch = Batch.of(frames)
     assert plain(batch.to_pandas().to_dict("records")) == batch.to_arrow().to_pylist() == rows
+
+
+def test_frames_of_successive_batches_are_numbered_on():
+    """As whoever appends one table to another sees them; a batch's own arrays begin at 0."""
+    pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    port = VirtualBoard(scene="two_fingers")
+    with contactfpga.open(port) as board:
+        batches = [board.batch() for _ in range(3)]
+    sent = [sequence for batch in batches for sequence in batch.frames["sequence"].tolist()]
+    assert len(sent) > len(batches) == 3
+    for tables in ([batch.to_arrow().to_pandas() for batch in batches], [batch.to_pandas() for batch in batches]):
+        numbers = [number for table in tables for number in table["frame"].tolist()]
+        assert sorted(set(numbers)) == list(range(len(sent)))
+    assert [int(batch.zones["frame"][0]) for batch in batches] == [0, 0, 0]
 
 
 def test_frames_without_zones_keep_their_columns():

@@ -105,6 +105,8 @@ class Conversation:
         self._rest = b""
         self._noticed = math.inf
         self._doubted = -math.inf
+        self.unused = 0
+        """Bytes that came to nothing: damaged, before the first hello, or of frames whose times are unknown."""
         self._begun = False  # the first piece is cut off by when we began to listen; it is no damage
         self._damage = False
 
@@ -254,7 +256,7 @@ class Conversation:
     def _end(self, now: float) -> None:
         self._clock.end(now)
         if len(self._rest) > LONGEST_PACKET:
-            self._refuse("noise")
+            self._refuse("noise", len(self._rest))
             self._rest = b""
         self._requests.poll(now, hello=not self._timeline.known)
 
@@ -325,7 +327,7 @@ class Conversation:
         except OldPacket as old:
             return self._foreign(old)
         except PacketError as error:
-            self._refuse(error.reason)
+            self._refuse(error.reason, len(packet) + 1)
             return None
         self._passed()
         return event
@@ -344,7 +346,8 @@ class Conversation:
             self._damage = False
             self.stats.resynchronized += 1
 
-    def _refuse(self, reason: str) -> None:
+    def _refuse(self, reason: str, size: int) -> None:
+        self.unused += size
         if self._begun:
             self.stats.damaged[reason] += 1
             self._damage = True
@@ -365,6 +368,7 @@ class Conversation:
     def _decode(self, packet: bytes, now: float) -> Event | None:
         if self.hello is None and framing.unreadable(packet):
             self.stats.before_hello += 1
+            self.unused += len(packet) + 1
             if (sheet := sheet_of(packet)) is not None:
                 self.numbers.add(sheet)
             return None
@@ -408,6 +412,7 @@ class Conversation:
         before = self._timeline.before
         time_us = self._timeline.take_frame(frame, widths, now)
         if time_us is None:
+            self.unused += packet_bytes + 1
             return None
         line = self._heard(frame.heard, time_us, packet_bytes, now)
         faults = self.lines.names("fault" in frame.flags)

@@ -1,41 +1,44 @@
 """Reader of boards' bytes in the MCAP file or files of one `contactfpga record`.
 
-Every read is bounded, because stated sizes may be false.
+Classes of the MCAP library read each record. Where records are and how much is unpacked is decided here, because the
+library's readers believe stated sizes, and keep every chunk that they were asked for.
 """
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import io
 import os
 import re
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire.hello import find_hello
 
 if TYPE_CHECKING:
-    from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
+    from mcap.records import Channel, Chunk, ChunkIndex, Schema
 
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9
-LARGEST = 1 << 25
-"""Most bytes of a record in the file."""
-UNPACKED = 1 << 23
-"""Most unpacked bytes of a chunk; ours have 64 KiB or one message, other programs' 4 MiB."""
+LARGEST = 1 << 26
+"""Most bytes of a record, and of an unpacked chunk; ours have 64 KiB or one message, other programs' 1 to 32 MiB."""
+FREE = 1 << 26
 RATIO = 1000
-"""Largest compression ratio of a chunk above :data:`FREE` bytes, which limits a file's time by its size; ours is about
-3.
-"""
-FREE = 1 << 17
-_MESSAGE = 22
+"""What a file unpacks to has at most FREE bytes and RATIO times its size; ours has up to 7 times its size."""
+LEAST = 1 << 11
+"""Bytes that each unpacked record counts at least, because each takes time; of that, ours use a tenth of the limit."""
+KINDS = {2: "Footer", 3: "Schema", 4: "Channel", 5: "Message", 6: "Chunk"}
+KINDS |= {8: "ChunkIndex", 9: "Attachment", 11: "Statistics", 12: "Metadata", 13: "MetadataIndex"}
+"""The MCAP library's class for each kind of record that matters here."""
 
 
 class RecordingError(ContactFPGAError):
@@ -43,87 +46,114 @@ class RecordingError(ContactFPGAError):
 
 
 class Unreadable(Exception):
-    """A record that is damaged or too large."""
+    """Why a file cannot be read; ``{recover}`` in the text stands for the command that mends it."""
+
+    def __init__(self, why: str = "is damaged; mend it with: {recover}"):
+        super().__init__(why)
+
+
+class Refused(Unreadable):
+    """The file is whole, but beyond a limit or ambiguous."""
 
 
 class Cut(Unreadable):
-    """The file ends within a record; ``size``: its present bytes."""
+    """The records end within one; ``size``: its present bytes."""
 
     def __init__(self, size: int):
+        super().__init__()
         self.size = size
 
 
-def record(file: BinaryIO) -> tuple[int, bytes] | None:
-    """Kind and content of the next record; None at the end of the file. Raises :class:`Cut`."""
-    head = file.read(HEAD)
-    if not head:
-        return None
-    size = int.from_bytes(head[1:], "little")
-    data = file.read(size) if len(head) == HEAD and size <= LARGEST else b""
-    if len(data) < size or len(head) < HEAD:
-        raise Cut(len(head) + len(data))
-    return head[0], data
+class Record(NamedTuple):
+    """A record from ``at`` to ``end``; ``kind``: of :data:`KINDS`, or empty; no ``data`` if too large."""
+
+    at: int
+    end: int
+    kind: str
+    data: bytes
 
 
-def parsed(kind: Any, data: bytes) -> Any:
+def records(file: BinaryIO, end: int) -> Iterator[Record]:
+    """Records from where the file stands up to ``end``. Raises :class:`Cut`."""
+    at = file.tell()
+    while at < end:
+        head = file.read(HEAD)
+        size = int.from_bytes(head[1:], "little")
+        stop = at + HEAD + size
+        if stop > end:
+            raise Cut(end - at)
+        kind = KINDS.get(head[0], "")
+        used = kind not in ("", "Attachment") and size <= LARGEST
+        yield Record(at, stop, kind, file.read(size) if used else b"")
+        at = stop
+        file.seek(at)
+
+
+def parsed(record: Record) -> Any:
     """The record as an object of the MCAP library. Raises :class:`Unreadable`."""
+    from mcap import records as classes
     from mcap.data_stream import ReadDataStream
 
+    if (size := record.end - record.at - HEAD) > LARGEST:
+        raise _too_large(record.kind, size)
+    stream = ReadDataStream(io.BytesIO(record.data))
     try:
-        return kind.read(ReadDataStream(io.BytesIO(data)))
+        read = getattr(classes, record.kind).read
+        return read(stream, size) if record.kind == "Message" else read(stream)
     except Exception:  # whatever the library stumbles over
         raise Unreadable from None
 
 
-def inside(chunk: Chunk) -> Iterator[Any]:
-    """Messages, channels and schemas of a chunk, in order. Raises :class:`Unreadable` before the first one."""
-    from mcap.opcode import Opcode
-    from mcap.records import Channel, Schema
+def _too_large(kind: str, size: int) -> Refused:
+    what, step = ("chunk", "with smaller chunks") if kind == "Chunk" else ("record", "without it")
+    return Refused(f"has a {what} of {size / 2**20:,.1f} MiB; the limit is {LARGEST >> 20} MiB; write it {step}")
 
-    data = memoryview(_unpacked(chunk))
-    at = 0
-    while at < len(data):
-        kind, size = data[at], int.from_bytes(data[at + 1 : at + HEAD], "little")
-        content = data[at + HEAD : at + HEAD + size]
-        if len(content) < size or len(data) < at + HEAD:
+
+class Unpacker:
+    """Unpacks the chunks of a file of ``size`` bytes, as far as its size allows."""
+
+    def __init__(self, size: int):
+        self._most = self._left = FREE + RATIO * size
+
+    def inside(self, chunk: Chunk) -> Iterator[Record]:
+        """Records of a chunk, in order. Raises :class:`Unreadable`, for a damaged chunk before the first one."""
+        size, packed = chunk.uncompressed_size, chunk.data
+        if size > LARGEST:
+            raise _too_large("Chunk", size)
+        if size > self._left:
+            raise self._too_much()
+        try:
+            data: bytes = _UNPACKERS[chunk.compression](packed, size)
+        except Exception:  # whatever a library stumbles over, or an unknown way to pack
+            raise Unreadable from None
+        if len(data) != size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
             raise Unreadable
-        if kind == Opcode.MESSAGE:
-            yield message(bytes(content))
-        elif kind in (Opcode.CHANNEL, Opcode.SCHEMA):
-            yield parsed(Channel if kind == Opcode.CHANNEL else Schema, bytes(content))
-        at += HEAD + size
+        for record in records(io.BytesIO(data), size):
+            self._left -= max(LEAST, record.end - record.at)
+            if self._left < 0:
+                raise self._too_much()
+            yield record
 
+    def each(self, file: BinaryIO, end: int) -> Iterator[Record]:
+        """:func:`records`, with those of a chunk in its place."""
+        for record in records(file, end):
+            if record.kind == "Chunk":
+                yield from self.inside(parsed(record))
+            else:
+                yield record
 
-def message(data: bytes) -> Any:
-    """The record of a message. Raises :class:`Unreadable`."""
-    from mcap.records import Message
-
-    if len(data) < _MESSAGE:
-        raise Unreadable
-    channel, sequence = int.from_bytes(data[:2], "little"), int.from_bytes(data[2:6], "little")
-    logged, published = int.from_bytes(data[6:14], "little"), int.from_bytes(data[14:_MESSAGE], "little")
-    return Message(channel, logged, data[_MESSAGE:], published, sequence)
-
-
-def _unpacked(chunk: Chunk) -> bytes:
-    """The chunk's bytes, exactly as many as it states and may have."""
-    size, packed = chunk.uncompressed_size, chunk.data
-    if size > min(UNPACKED, max(FREE, RATIO * len(packed))):
-        raise Unreadable
-    try:
-        data: bytes = _UNPACKERS[chunk.compression](packed, size)
-    except Exception:  # whatever a library stumbles over, or an unknown way to pack
-        raise Unreadable from None
-    if len(data) != size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
-        raise Unreadable
-    return data
+    def _too_much(self) -> Refused:
+        return Refused(
+            f"unpacks to more than {self._most >> 20:,} MiB, the limit for its size (each record counts at least "
+            f"{LEAST >> 10} KiB); split it"
+        )
 
 
 def _zstd(packed: bytes, size: int) -> bytes:
     import zstandard
 
     # A window is kept for what was unpacked before.
-    return bytes(zstandard.ZstdDecompressor(max_window_size=UNPACKED).stream_reader(packed).read(size + 1))
+    return bytes(zstandard.ZstdDecompressor(max_window_size=LARGEST).stream_reader(packed).read(size + 1))
 
 
 def _lz4(packed: bytes, size: int) -> bytes:
@@ -171,67 +201,189 @@ def files_of(path: Path) -> list[Path]:
     return [numbered(path, number) for number in sorted(numbers)] or [path]
 
 
+class Place(NamedTuple):
+    """Bytes of a file with messages of these channels and times."""
+
+    at: int
+    end: int
+    start_ns: int
+    end_ns: int
+    channels: Set[int]
+
+
+class Index:
+    """What is where in a closed file: by its summary or, if that leaves something out, by all its records. Raises
+    :class:`Unreadable`.
+    """
+
+    def __init__(self, file: BinaryIO):
+        self._end = file_bytes(file) - _FOOTER_BYTES
+        file.seek(max(0, self._end))
+        footer = next(records(file, self._end + _FOOTER_BYTES - len(MAGIC)), None) if self._end > 0 else None
+        if footer is None or footer.kind != "Footer" or file.read() != MAGIC:
+            raise Unreadable("was not closed; mend it with: {recover}")
+        self.summary = parsed(footer).summary_start
+        self._clear()
+        try:
+            if not (self.summary and self._by_summary(file)):
+                self._clear()
+                self._by_records(file)
+        except Unreadable as error:
+            if not isinstance(error, Refused):
+                _check_single(file, self._end)
+            raise
+
+    def _clear(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.places: list[Place] = []
+        self.texts: list[tuple[int, int]] = []
+        self._sets: dict[Set[int], Set[int]] = {}
+
+    def kind(self, channel: Channel) -> str:
+        return self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
+
+    def _by_summary(self, file: BinaryIO) -> bool:
+        """Whether the summary tells all."""
+        counted = None
+        file.seek(min(self.summary, self._end))
+        for record in records(file, self._end):
+            if record.kind in ("ChunkIndex", "MetadataIndex", "Statistics"):
+                one = parsed(record)
+                if record.kind == "Statistics":
+                    counted = one.channel_count, one.chunk_count, one.metadata_count
+                elif record.kind == "MetadataIndex":
+                    self.texts.append((one.offset, one.offset + one.length))
+                else:
+                    self._add(one.chunk_start_offset, one.chunk_length, one, one.message_index_offsets)
+            else:
+                self._defined(record)
+        schemas = {channel.schema_id for channel in self.channels.values()} - {0}
+        known = all(place.channels and place.channels <= self.channels.keys() for place in self.places)
+        whole = counted in (None, (len(self.channels), len(self.places), len(self.texts)))
+        return bool(self.places) and known and whole and schemas <= self.schemas.keys()
+
+    def _by_records(self, file: BinaryIO) -> None:
+        unpacker = Unpacker(file_bytes(file))
+        loose: list[int] = []  # first and last time of messages outside of chunks
+        file.seek(len(MAGIC))
+        for record in records(file, self._end):
+            if record.kind == "Chunk":
+                chunk = parsed(record)
+                if inside := {_channel(one) for one in unpacker.inside(chunk) if self._defined(one)}:
+                    self._add(record.at, record.end - record.at, chunk, inside)
+            elif record.kind == "Metadata":
+                self.texts.append((record.at, record.end))
+            elif self._defined(record):
+                ns = parsed(record).log_time
+                loose = [min([ns, *loose]), max([ns, *loose])]
+        if loose:
+            times = [ns for place in self.places for ns in place[2:4]] + loose
+            self.places = [Place(len(MAGIC), self._end, min(times), max(times), self.channels.keys())]
+
+    def _add(self, at: int, size: int, of: ChunkIndex | Chunk, channels: Iterable[int]) -> None:
+        times = of.message_start_time, of.message_end_time
+        found = frozenset(channels)
+        self.places.append(Place(at, at + size, *times, self._sets.setdefault(found, found)))  # many are equal
+
+    def _defined(self, record: Record) -> bool:
+        """Whether a record is a message; definitions are kept. Raises :class:`Unreadable` for another file's end."""
+        if record.kind == "Footer":
+            raise Unreadable
+        if record.kind in ("Schema", "Channel"):
+            one = parsed(record)
+            (self.schemas if record.kind == "Schema" else self.channels)[one.id] = one
+        return record.kind == "Message"
+
+
+def _channel(message: Record) -> int:
+    return int.from_bytes(message.data[:2], "little")
+
+
+def _check_single(file: BinaryIO, end: int) -> None:
+    file.seek(len(MAGIC))
+    with contextlib.suppress(Cut):
+        if any(record.kind == "Footer" for record in records(file, end)):
+            raise Unreadable("holds several recordings, one after the other; join them with: {recover}")
+
+
+_MIXED = (
+    "mixes bytes of several boards named {!r}, as merging does; give them different names, or read each recording alone"
+)
+
+
 class McapPart:
     """A closed or recovered file."""
 
     def __init__(self, path: Path):
         self.path = path
         with self._opened() as file:
-            summary = Summary(file)
-        found = [channel for channel in summary.channels.values() if summary.kind(channel) == KIND]
-        names = [channel.metadata.get("link", channel.topic) for channel in found]
+            index = Index(file)
+        self._texts = index.texts
+        found: dict[tuple[str, str], set[int]] = {}
+        for number, channel in index.channels.items():
+            if index.kind(channel) == KIND:
+                found.setdefault((channel.metadata.get("link", channel.topic), channel.topic), set()).add(number)
+        shared = collections.Counter(link for link, _ in found)
+        names = [link if shared[link] == 1 else topic for link, topic in found]
         if len(names) > MAX_LINKS or max(map(len, names), default=0) > MAX_NAME:
             raise RecordingError(
                 f"{path} has {len(names)} links, the longest name {max(map(len, names))} characters; the limits are "
                 f"{MAX_LINKS} and {MAX_NAME}"
             )
-        self.topics: dict[str, str] = {name: channel.topic for name, channel in zip(names, found, strict=True)}
-        self.start_ns: int = summary.statistics.message_start_time
-        self.end_ns: int = summary.statistics.message_end_time
+        self.links: dict[str, set[int]] = dict(zip(names, found.values(), strict=True))
+        """Channels of each link; links of one name, as of boards that were merged, are named by their topics."""
+        if len(self.links) < len(names):
+            raise RecordingError(f"{path} holds links that share names and topics; record them under different names")
+        self.start_ns = min((place.start_ns for place in index.places), default=0)
+        self.end_ns = max((place.end_ns for place in index.places), default=0)
+        ours = set().union(*self.links.values())
+        self._places = [place for place in index.places if not ours.isdisjoint(place.channels)]
 
     def texts(self, name: str) -> list[dict[str, str]]:
         """The texts of this name in the metadata."""
-        from mcap.opcode import Opcode
-        from mcap.records import Metadata
-
         found = []
         with self._opened() as file:
-            places = Summary(file).texts
-            if len(places) > MAX_TEXTS:
-                raise Unreadable
-            for data in _each(file, Opcode.METADATA, places):
-                text = parsed(Metadata, data)
-                found += [text.metadata] if text.name == name else []
+            if len(self._texts) > MAX_TEXTS:
+                raise Refused(f"has {len(self._texts):,} texts; the limit is {MAX_TEXTS:,}")
+            for at, end in _apart(file, self._texts):
+                for record in records(file, end):
+                    text = parsed(record) if record.kind == "Metadata" else None
+                    if text is None or record.at != at:
+                        raise Unreadable
+                    found += [text.metadata] if text.name == name else []
         return found
 
     def read(self, link: str, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
         """(arrival of the last byte in ns, bytes) of a link in order, from ``begin_ns`` up to ``end_ns``, with one
         chunk in memory.
         """
-        from mcap.opcode import Opcode
-        from mcap.records import Chunk, Message
-
         begin_ns = 0 if begin_ns is None else begin_ns
         end_ns = 1 << 64 if end_ns is None else end_ns
-        if link not in self.topics or self.start_ns >= end_ns or self.end_ns < begin_ns:
+        if link not in self.links or self.start_ns >= end_ns or self.end_ns < begin_ns:
             return
+        channels = self.links[link]
+        asked = [
+            (place.at, place.end)
+            for place in self._places
+            if place.end_ns >= begin_ns and place.start_ns < end_ns and not channels.isdisjoint(place.channels)
+        ]
         with self._opened() as file:
-            summary = Summary(file)
-            numbers = {number for number, one in summary.channels.items() if one.topic == self.topics[link]}
-            asked = [
-                (index.chunk_start_offset, index.chunk_length)
-                for index in summary.chunks
-                if index.message_end_time >= begin_ns
-                and index.message_start_time < end_ns
-                # Without a list of them any may be in it.
-                and (not index.message_index_offsets or numbers & index.message_index_offsets.keys())
-            ]
-            del summary
-            for data in _each(file, Opcode.CHUNK, asked):
-                for record in inside(parsed(Chunk, data)):
-                    mine = isinstance(record, Message) and record.channel_id in numbers
-                    if mine and begin_ns <= record.log_time < end_ns:
-                        yield record.log_time, data_of(record.data)
+            unpacker = Unpacker(file_bytes(file))
+            due, left, gone = (-1, 0), collections.deque[tuple[int, int]](maxlen=MAX_LINKS), set[int]()
+            for _, end in _apart(file, asked):
+                for record in unpacker.each(file, end):
+                    if record.kind == "Message" and _channel(record) in channels:
+                        message = parsed(record)
+                        if (now := (message.channel_id, message.sequence)) != due:
+                            # One goes on where another one came in between; old recordings have no sequence.
+                            if now in left or (now[0] != due[0] and now[0] in gone):
+                                raise Refused(_MIXED.format(link))
+                            left.append(due)
+                            gone.add(due[0])
+                        due = message.channel_id, message.sequence + 1
+                        if begin_ns <= message.log_time < end_ns:
+                            yield message.log_time, data_of(message.data)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
@@ -248,74 +400,24 @@ class McapPart:
                 raise RecordingError(f"{self.path} is no MCAP file")
             try:
                 yield file
-            except (Unreadable, struct.error, OSError):
-                raise RecordingError(
-                    f"{self.path} is damaged or was not closed; mend it with: contactfpga record --recover {self.path}"
-                ) from None
+            except (Unreadable, struct.error, OSError) as error:
+                why = str(error if isinstance(error, Unreadable) else Unreadable())
+                recover = shell_words("contactfpga", "record", "--recover", self.path)
+                raise RecordingError(f"{self.path} {why.replace('{recover}', recover)}") from None
 
 
-class Summary:
-    """The summary at the end of a closed file. Raises :class:`Unreadable`."""
-
-    def __init__(self, file: BinaryIO):
-        from mcap.opcode import Opcode
-        from mcap.records import Channel, ChunkIndex, Footer, MetadataIndex, Schema, Statistics
-
-        kinds = {
-            Opcode.SCHEMA: Schema,
-            Opcode.CHANNEL: Channel,
-            Opcode.CHUNK_INDEX: ChunkIndex,
-            Opcode.METADATA_INDEX: MetadataIndex,
-            Opcode.STATISTICS: Statistics,
-        }
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.chunks: list[ChunkIndex] = []
-        self.texts: list[tuple[int, int]] = []
-        counted: Statistics | None = None
-        end = _file_bytes(file) - _FOOTER_BYTES
-        file.seek(max(0, end))
-        found = record(file)
-        if found is None or found[0] != Opcode.FOOTER or file.read() != MAGIC:
-            raise Unreadable
-        start = parsed(Footer, found[1]).summary_start
-        file.seek(min(start, end) if start else end)
-        while file.tell() < end and (found := record(file)) is not None:
-            if found[0] not in kinds:
-                continue
-            one = parsed(kinds[Opcode(found[0])], found[1])
-            if isinstance(one, Schema):
-                self.schemas[one.id] = one
-            elif isinstance(one, Channel):
-                self.channels[one.id] = one
-            elif isinstance(one, ChunkIndex):
-                self.chunks.append(one)
-            elif isinstance(one, MetadataIndex):
-                self.texts.append((one.offset, one.length))
-            else:
-                counted = one
-        if counted is None:
-            raise Unreadable
-        self.statistics = counted
-
-    def kind(self, channel: Channel) -> str:
-        return self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
-
-
-def _each(file: BinaryIO, kind: int, places: list[tuple[int, int]]) -> Iterator[bytes]:
+def _apart(file: BinaryIO, places: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+    """These places in order, with the file at each. Raises :class:`Unreadable` if one is in the way of another."""
     free = 0
-    for at, size in sorted(places):
-        if not free <= at <= at + size <= _file_bytes(file):
+    for at, end in sorted(places):
+        if not free <= at < end <= file_bytes(file):
             raise Unreadable
         file.seek(at)
-        found = record(file)
-        free = at + size
-        if found is None or found[0] != kind or file.tell() != free:
-            raise Unreadable
-        yield found[1]
+        yield at, end
+        free = end
 
 
-def _file_bytes(file: BinaryIO) -> int:
+def file_bytes(file: BinaryIO) -> int:
     return os.fstat(file.fileno()).st_size
 
 
@@ -335,12 +437,12 @@ class McapBytes:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self._parts = [McapPart(one) for one in files_of(self.path)]
-        held = {link for part in self._parts for link in part.topics}
+        held = {link for part in self._parts for link in part.links}
         added = [facts.get("link", "") for facts in self.texts(METADATA)]
         self._links = sorted(held, key=lambda link: (added.index(link) if link in added else len(added), link))
         if not self._links:
             raise RecordingError(f"{path} holds no bytes of a board; `contactfpga record` makes files that do")
-        parts = [part for part in self._parts if part.topics]
+        parts = [part for part in self._parts if part.links]
         self.start_ns = min(part.start_ns for part in parts)
         self.end_ns = max(part.end_ns for part in parts)
 

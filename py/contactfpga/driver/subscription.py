@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Generic, TypeVar, cast
@@ -172,6 +173,8 @@ class Subscription(Listening[Zones]):
     deadline, :class:`NoData` is raised each time that it passes without a frame.
     """
 
+    _batched = 0  # frames in batches so far
+
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
         max_s = checked_span(max_s)
@@ -181,7 +184,10 @@ class Subscription(Listening[Zones]):
             link.linger(until, max_s)
         with link.changed:
             frames = self._frames.pop_frames()
-        return Batch.of(frames or [self.next(timeout)])
+        batch = Batch.of(frames or [self.next(timeout)])
+        with link.changed:
+            first, self._batched = self._batched, self._batched + len(batch)
+        return dataclasses.replace(batch, first=first)
 
     # ---- for the board
 

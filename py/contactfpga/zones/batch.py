@@ -64,6 +64,8 @@ class Batch:
     """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and of their zones."""
     faults: tuple[tuple[str, ...], ...] = ()
     """:attr:`Zones.faults` of each frame."""
+    first: int = 0
+    """Frames in the earlier batches of the same reader. Tables begin their ``frame`` with it."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -79,14 +81,20 @@ class Batch:
         return starts
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row per zone, with the fields of :attr:`zones` as columns; ``point_mm`` and ``normal`` are three columns
-        each (``point_x_mm``). ``pandas.DataFrame(batch.frames)`` has a row per frame. Raises :class:`MissingExtra`
-        without pandas."""
-        return tables.to_pandas(self.zones)
+        """A row per zone, with the fields of :attr:`zones` as columns; ``frame`` goes on from batch to batch, and
+        ``point_mm`` and ``normal`` are three columns each (``point_x_mm``). ``pandas.DataFrame(batch.frames)`` has a
+        row per frame. Raises :class:`MissingExtra` without pandas."""
+        return tables.to_pandas(self._numbered())
 
     def to_arrow(self) -> pyarrow.Table:
-        """The zones as a pyarrow table, with null for NaN. Raises :class:`MissingExtra` without pyarrow."""
-        return tables.to_arrow(self.zones)
+        """The zones as a pyarrow table, with null for NaN; ``frame`` goes on from batch to batch. Raises
+        :class:`MissingExtra` without pyarrow."""
+        return tables.to_arrow(self._numbered())
+
+    def _numbered(self) -> np.ndarray:
+        zones = self.zones.copy()
+        zones["frame"] += self.first
+        return zones
 
     @classmethod
     def of(cls, frames: Sequence[Zones | Run]) -> Batch:

@@ -123,6 +123,7 @@ class OpenBody:
         self._timeout, self._period_s = checked(timeout), period_s
         self._changes = _Changes()
         self._given = 0  # the last change that next() has returned
+        self._batched: collections.Counter[str] = collections.Counter()  # frames of each link in batches
         forks.watch(self)
         opener, shared_clock = opened or self._open_board, SharedClock(self.clock)
         self._readers = {name: LinkReader(plan, opener, self.clock, shared_clock) for name, plan in body.links.items()}
@@ -202,7 +203,10 @@ class OpenBody:
                     found.append(queue.next(left_s))
                 except ReadTimeout:
                     break
-        return SnapshotBatch(found)
+        batch = SnapshotBatch(found)
+        with self._changes.condition:
+            batch.continue_from(self._batched)
+        return batch
 
     def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
         """A separate queue for the snapshot at each change from now on."""

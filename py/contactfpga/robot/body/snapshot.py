@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Protocol, overload
 
@@ -329,6 +330,12 @@ class SnapshotBatch(Sequence["Snapshot"]):
             frames = _frames(name, self._snapshots)
             if frames:
                 self.links[name] = Batch.of(frames)
+
+    def continue_from(self, before: Counter[str]) -> None:
+        """Number each link's frames on from those of earlier batches, and count these."""
+        for name, batch in self.links.items():
+            self.links[name] = dataclasses.replace(batch, first=before[name])
+            before[name] += len(batch)
 
     @overload
     def __getitem__(self, index: int) -> Snapshot: ...

@@ -23,4 +23,6 @@ def run(args: argparse.Namespace) -> int:
     path = outputs.file(args.table, "OUT")
     rows = export(recording, path)
     terminal.say(f"{path}: {rows:,} rows of {recording.duration_s:.1f} s")
+    for link, count in (+recording.unused).items():
+        terminal.say(f"{link}: {count:,} bytes could not be used; they are damaged, or no hello comes before them")
     return 0

@@ -120,12 +120,14 @@ def _recover(args: argparse.Namespace) -> int:
         terminal.say(
             f"{args.file} holds {found.recordings} recordings, one after the other; the new file has them all."
         )
-    elif found.closed and not found.damaged and not found.beyond:
+    elif found.usable:
         terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
     if found.cut:
         terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
     if found.damaged:
         terminal.say(f"Left out in between: {_pieces(found.damaged)}; frames are missing there.")
+    for what, count in found.omitted.items():
+        terminal.say(f"Left out: {count:,} {what}.")
     if found.beyond:
         terminal.say(f"Left out after the end: {found.beyond:,} bytes that are no recording.")
     return 0

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import errno
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import told
+from contactfpga.inputs.values import shell_words
 from contactfpga.robot.ros.types import schema
 
 if TYPE_CHECKING:
-    from mcap.records import Channel, Schema
+    from mcap.records import Channel, Message, Schema
 
 
 class RecordingFailed(ContactFPGAError):
@@ -31,6 +33,8 @@ class WholeFile:
 
     def __init__(self, path: Path):
         self.path = path
+        self.holds_messages = False
+        """Whether what is written so far can be recovered."""
         self._whole = 0
         self._waiting = bytearray()
         try:
@@ -68,13 +72,19 @@ class WholeFile:
             self._descriptor = -1
 
     def _failed(self, error: OSError) -> RecordingFailed:
-        with contextlib.suppress(OSError):
-            os.ftruncate(self._descriptor, self._whole)
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         reason = f"there is no room for more ({error.strerror})" if full else error.strerror or told(error)
+        if not self.holds_messages:
+            self.close()
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            return RecordingFailed(f"{self.path}: {reason}; nothing was recorded. Make room, then record again", reason)
+        with contextlib.suppress(OSError):
+            os.ftruncate(self._descriptor, self._whole)
+        recover = shell_words("contactfpga", "record", "--recover", self.path)
         return RecordingFailed(
-            f"{self.path}: {reason}; the {self._whole / 1e6:.1f} MB that are there are whole. "
-            f"Make room, then close the file with: contactfpga record --recover {self.path}",
+            f"{self.path}: {reason}; the {self._whole:,} bytes that are there are whole. "
+            f"Make room, then close the file with: {recover}",
             reason,
         )
 
@@ -103,8 +113,9 @@ class McapFile:
         # Chunks end where we say so.
         self._writer = Writer(self._file, chunk_size=1 << 40, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2", library="contactfpga")
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
+        self._schemas: dict[object, int] = {}
+        self._channels: dict[object, int] = {}
+        self._written: collections.Counter[int] = collections.Counter()  # messages of each channel
         self._waiting = 0
         self._since_s = math.inf
         self.flush()
@@ -122,34 +133,38 @@ class McapFile:
         self._writer.add_metadata(name, dict(values))
         self.flush()
 
-    def write(self, topic: str, kind: str, link: str, time_ns: int, data: bytes, now_s: float) -> None:
+    def write(self, topic: str, kind: str, link: str | None, time_ns: int, data: bytes, now_s: float) -> None:
         """Add a message of a type such as ``contactfpga_msgs/Zones``; ``now_s`` is from ``time.monotonic``."""
         self._make_room(data)
-        channel = self._channels.get(topic)
+        channel = self._channels.get((topic, link, kind))
         if channel is None:
             package, _, short = kind.partition("/")
-            name, metadata = f"{package}/msg/{short}", {"link": link} if link else {}
-            channel = self._register(topic, "cdr", metadata, name, "ros2msg", lambda: schema(kind).encode())
-        self._add(channel, time_ns, data)
+            name, metadata = f"{package}/msg/{short}", {} if link is None else {"link": link}
+            text = self._schema(name, "ros2msg", schema(kind).encode())
+            channel = self._writer.register_channel(topic, "cdr", text, metadata)
+            self._channels[topic, link, kind] = channel
+        self._add(channel, time_ns, data, self._written[channel])
         self._since_s = min(self._since_s, now_s)
         self.flush_old(now_s)
 
-    def copy(self, channel: Channel, of: Schema | None, time_ns: int, data: bytes) -> None:
-        self._make_room(data)
-        number = self._channels.get(channel.topic)
+    def copy(self, recording: int, channel: Channel, of: Schema | None, message: Message) -> None:
+        """Add a message of another file; each channel of each of its recordings stays one."""
+        self._make_room(message.data)
+        key = recording, channel.id, channel.topic
+        number = self._channels.get(key)
         if number is None:
-            name, encoding, text = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
-            number = self._register(
-                channel.topic, channel.message_encoding, channel.metadata, name, encoding, lambda: text
-            )
-        self._add(number, time_ns, data)
+            text = 0 if of is None else self._schema(of.name, of.encoding, of.data)
+            number = self._writer.register_channel(channel.topic, channel.message_encoding, text, channel.metadata)
+            self._channels[key] = number
+        self._add(number, message.log_time, message.data, message.sequence)
 
     def _make_room(self, data: bytes) -> None:
         if self._waiting and self._waiting + len(data) + _MESSAGE_BYTES > CHUNK_BYTES:
             self.flush()
 
-    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
-        self._writer.add_message(channel, time_ns, data, time_ns)
+    def _add(self, channel: int, time_ns: int, data: bytes, sequence: int) -> None:
+        self._writer.add_message(channel, time_ns, data, time_ns, sequence % (1 << 32))
+        self._written[channel] += 1
         self._waiting += len(data) + _MESSAGE_BYTES
         self._first_ns = min(self._first_ns, time_ns) if self.messages else time_ns
         self._last_ns = max(self._last_ns, time_ns)
@@ -163,6 +178,7 @@ class McapFile:
     def flush(self) -> None:
         self._waiting, self._since_s = 0, math.inf
         self._guarded(self._writer.flush)
+        self._file.holds_messages = self.messages > 0
 
     def close(self) -> None:
         """Write buffered messages and the index; may be called twice."""
@@ -184,11 +200,8 @@ class McapFile:
             self._failed = True
             raise
 
-    def _register(
-        self, topic: str, encoding: str, metadata: dict[str, str], kind: str, language: str, text: Callable[[], bytes]
-    ) -> int:
-        if kind not in self._schemas:
-            self._schemas[kind] = self._writer.register_schema(kind, language, text()) if kind else 0
-        number: int = self._writer.register_channel(topic, encoding, self._schemas[kind], metadata)
-        self._channels[topic] = number
-        return number
+    def _schema(self, name: str, encoding: str, text: bytes) -> int:
+        key = (name, encoding, text)
+        if key not in self._schemas:
+            self._schemas[key] = self._writer.register_schema(name, encoding, text)
+        return self._schemas[key]

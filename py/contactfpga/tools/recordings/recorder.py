@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from pathlib import Path
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap import METADATA, numbered
+from contactfpga.driver.mcap import MAX_LINKS, MAX_NAME, METADATA, numbered
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import shown
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.convert import header
 from contactfpga.robot.ros.feed import offset_ns
@@ -66,7 +68,11 @@ class Recorder:
         with self.lock:
             if name in {link.name for link in self._links}:
                 raise ContactFPGAError(f"two links are named {name!r}; give their Skins different names")
-            link = LinkFile(self, name, facts(name, board), _epoch_ns(board))
+            if len(self._links) == MAX_LINKS or len(name) > MAX_NAME:
+                limits = f"a recording has at most {MAX_LINKS} links, with names of {MAX_NAME} characters"
+                raise ContactFPGAError(f"link {shown(name)} cannot be added: {limits}")
+            topic = topic_of(name, {link.topic for link in self._links})
+            link = LinkFile(self, name, topic, facts(name, board), _epoch_ns(board))
             self._links.append(link)
             self.about(METADATA, link.facts)
             return link
@@ -115,7 +121,7 @@ class Recorder:
         file.close()
         self._sizes[file.path] = file.size
         if not file.messages and len(self.files) > 1:  # begun at the very end
-            file.path.unlink()
+            file.path.unlink(missing_ok=True)
             self.files.remove(file.path)
             del self._sizes[file.path]
 
@@ -132,13 +138,13 @@ class Recorder:
 class LinkFile:
     """One link's output into its current file."""
 
-    def __init__(self, recorder: Recorder, name: str, facts: dict[str, str], epoch_ns: int):
+    def __init__(self, recorder: Recorder, name: str, topic: str, facts: dict[str, str], epoch_ns: int):
         self.name = name
+        self.topic = topic
         self.facts = facts
         self.file = recorder.file
         self._recorder = recorder
         self._epoch_ns = epoch_ns
-        self._topic = topic_of(name)
         self._cutter: Cutter | None = None
 
     def time_ns(self, clock_s: float) -> int:
@@ -157,8 +163,8 @@ class LinkFile:
 
     def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
         """Add a message; ``what`` ends its topic, or with a leading slash is all of it."""
-        topic = what if what.startswith("/") else f"{self._topic}/{what}"
-        link = "" if what.startswith("/") else self.name
+        topic = what if what.startswith("/") else f"{self.topic}/{what}"
+        link = None if what.startswith("/") else self.name
         with self._recorder.lock:
             self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
 
@@ -184,10 +190,14 @@ class LinkFile:
             self.write("bytes", BYTES, of_bytes(data, time_ns, self.name), clock_s)
 
 
-def topic_of(link: str) -> str:
-    """Topic of a link's messages, with underscores for characters that ROS does not allow."""
+def topic_of(link: str, taken: Set[str] = frozenset()) -> str:
+    """Topic of a link's messages, with underscores for characters that ROS does not allow, and with a number at its end
+    if the topic is ``taken`` by another link.
+    """
     name = re.sub(r"\W", "_", link, flags=re.ASCII)
-    return f"/{name}" if name and not name[0].isdigit() else f"/_{name}"
+    topic = f"/{name}" if name and not name[0].isdigit() else f"/_{name}"
+    numbered = (f"{topic}_{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([topic], numbered) if one not in taken)
 
 
 def facts(name: str, board: Board) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import heapq
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,6 +38,9 @@ class Recording:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self._file = McapBytes(path)
+        self.unused: Counter[str] = Counter()
+        """Bytes of each link of which :meth:`frames`, when last called, made nothing: damaged ones, and those before
+        any hello."""
 
     @property
     def start_s(self) -> float:
@@ -61,8 +65,8 @@ class Recording:
     @functools.cached_property
     def skins(self) -> dict[str, Skin | None]:
         """The Skin of each link; None if only its hello is known."""
-        texts = {facts.get("link"): facts.get("skin", "") for facts in self.texts(METADATA)}
-        return {link: _skin(texts.get(link, "")) for link in self.links}
+        texts = {(facts.get("link"), facts.get("fingerprint")): facts.get("skin", "") for facts in self.texts(METADATA)}
+        return {link: _skin(texts.get((link, one.fingerprint.hex()), "")) for link, one in self.links.items()}
 
     def texts(self, name: str) -> list[dict[str, str]]:
         """Texts stored by name; ``robot``: the `robot.toml` of its links, with the files it names."""
@@ -103,6 +107,7 @@ class Recording:
         for moment_ns, data in self._file.pieces(link, start_ns):
             moment_s = self._seconds(moment_ns)
             found = [zones for event in conversation.receive_runs(data, 0.0) for zones in _frames_of(event)]
+            self.unused[link] = conversation.unused
             # The last one had come by then, and the board's clock says how long before it the others were scanned.
             for zones in found:
                 before_s = max(0.0, (found[-1].time_us - zones.time_us) / 1e6)
@@ -118,6 +123,7 @@ class Recording:
             conversation.receive(data, 0.0)
             if conversation.hello is not None:
                 return conversation.hello
+        self.unused[link] = conversation.stats.bytes
         return None
 
 

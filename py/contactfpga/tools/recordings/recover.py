@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import dataclasses
 import os
+import struct
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver import mcap
-from contactfpga.driver.mcap import MAGIC, Cut, RecordingError, Summary, Unreadable
+from contactfpga.driver.mcap import (
+    LARGEST,
+    MAGIC,
+    Cut,
+    Index,
+    McapPart,
+    Record,
+    RecordingError,
+    Refused,
+    Unpacker,
+    Unreadable,
+    file_bytes,
+    parsed,
+    records,
+)
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, replaced, told
 from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
@@ -26,11 +42,15 @@ class RecoveryReport:
     seconds: float = 0.0
     """Seconds from the first message to the last one."""
     damaged: int = 0
-    """Inner pieces omitted because they are damaged or too large."""
+    """Inner pieces omitted because they are damaged."""
+    omitted: Counter[str] = dataclasses.field(default_factory=Counter)
+    """What else is omitted, by what it is."""
     cut: int = 0
     """Bytes of an incomplete final piece."""
     closed: bool = False
     """Whether the last recording was properly closed."""
+    usable: bool = False
+    """Whether nothing was left out, and the old file can be read as it is."""
     recordings: int = 1
     """Consecutive recordings in the file."""
     beyond: int = 0
@@ -60,131 +80,129 @@ def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
         try:
             with replaced(target) as new:
                 _copy_all(file, new, found)
+                found.usable = _usable(source, found)
                 if not found.messages:
-                    raise RecordingError(f"{source} holds not one whole message; there is nothing to recover")
+                    why = ", ".join(f"{count:,} {what}" for what, count in found.omitted.items())
+                    raise RecordingError(
+                        f"{source} holds {why or 'not one whole message'}; there is nothing to recover"
+                    )
         except RecordingFailed as error:
             raise RecordingError(f"{target} cannot be written: {error.reason}; nothing of it is left") from None
+        except struct.error:
+            raise RecordingError(f"{source} has more channels or schemas than a file can hold") from None
         except OSError as error:
             raise RecordingError(f"{target} cannot be written: {error.strerror or told(error)}") from None
     return found
 
 
+TOO_LARGE = f"pieces above {LARGEST >> 20} MiB, or beyond what a file of this size may unpack to"
+
+
 def _copy_all(file: BinaryIO, new: Path, found: RecoveryReport) -> None:
     definitions = _definitions(file)
     new.unlink()  # as it will be made
-    copy = _Copy(new)
+    copy, unpacker = McapFile(new), Unpacker(file_bytes(file))
     try:
-        for number, kind, data in _walk(file, found):
-            if number >= len(copy.definitions):
-                copy.definitions.append(definitions[number])
+        for number, record in _walk(file, found):
             try:
-                for record in _inside(kind, data):
-                    copy.take(record, found)
+                for one in unpacker.inside(parsed(record)) if record.kind == "Chunk" else [record]:
+                    _take(one, number, definitions[number], copy, found)
+            except Refused:
+                found.omitted[TOO_LARGE] += 1
             except Unreadable:
                 found.damaged += 1
     finally:
         copy.close()
+    found.messages, found.seconds = copy.messages, copy.seconds
+
+
+Definitions = dict[tuple[str, int], Any]
+"""Schemas and channels of a recording, by kind and number."""
+
+
+def _take(record: Record, number: int, known: Definitions, copy: McapFile, found: RecoveryReport) -> None:
+    _define(record, known)
+    if record.kind == "Attachment":
+        found.omitted["attachments"] += 1
+    elif record.kind == "Metadata":
+        text = parsed(record)
+        copy.metadata(text.name, text.metadata)
+    elif record.kind == "Message":
+        message = parsed(record)
+        if (channel := known.get(("Channel", message.channel_id))) is None:
+            found.omitted["messages of channels that are not defined"] += 1
+        else:
+            copy.copy(number, channel, known.get(("Schema", channel.schema_id)), message)
+
+
+def _define(record: Record, known: Definitions) -> None:
+    if record.kind in ("Schema", "Channel"):
+        one = parsed(record)
+        known[record.kind, one.id] = one
+
+
+def _usable(source: Path, found: RecoveryReport) -> bool:
+    if not found.closed or found.damaged or found.beyond or any(what != "attachments" for what in found.omitted):
+        return False
     try:
-        Summary(file)
-    except Unreadable:
-        found.closed = False
+        part = McapPart(source)
+        return all(True for link in part.links for _ in part.read(link))
+    except RecordingError:
+        return False
 
 
-class _Definitions:
-    def __init__(self) -> None:
-        self.schemas: dict[int, Any] = {}
-        self.channels: dict[int, Any] = {}
-
-    def take(self, record: Any) -> None:
-        from mcap.records import Channel, Schema
-
-        if isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
-
-
-class _Copy:
-    def __init__(self, path: Path):
-        self._file = McapFile(path)
-        self.definitions: list[_Definitions] = []
-        """Definitions of each recording so far; the last one's numbers count."""
-        self._first_ns: int | None = None
-
-    def take(self, record: Any, found: RecoveryReport) -> None:
-        from mcap.records import Message, Metadata
-
-        known = self.definitions[-1]
-        known.take(record)
-        if isinstance(record, Metadata):
-            self._file.metadata(record.name, record.metadata)
-        elif isinstance(record, Message) and record.channel_id in known.channels:
-            channel = known.channels[record.channel_id]
-            self._file.copy(channel, known.schemas.get(channel.schema_id), record.log_time, record.data)
-            self._first_ns = record.log_time if self._first_ns is None else self._first_ns
-            found.messages += 1
-            found.seconds = max(found.seconds, (record.log_time - self._first_ns) / 1e9)
-
-    def close(self) -> None:
-        self._file.close()
-
-
-def _definitions(file: BinaryIO) -> list[_Definitions]:
+def _definitions(file: BinaryIO) -> list[Definitions]:
     """Definitions of each recording; a closed one repeats them at its end, in case its first piece is damaged."""
-    from mcap.opcode import Opcode
-
-    found: list[_Definitions] = []
-    for number, kind, data in _walk(file, counts := RecoveryReport(Path())):
-        found += [_Definitions() for _ in range(len(found), number + 1)]
-        if kind in (Opcode.SCHEMA, Opcode.CHANNEL):
-            with contextlib.suppress(Unreadable):
-                for record in _inside(kind, data):
-                    found[number].take(record)
-    if len(found) == 1 and counts.cut:  # it may have an end all the same
+    found: list[Definitions] = []
+    for number, record in _walk(file, RecoveryReport(Path())):
+        found += [{} for _ in range(len(found), number + 1)]
         with contextlib.suppress(Unreadable):
-            summary = Summary(file)
-            found[0].schemas, found[0].channels = dict(summary.schemas), dict(summary.channels)
+            _define(record, found[number])
     return found
 
 
-def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, bytes]]:
-    from mcap.opcode import Opcode
-
-    number = 0
-    file.seek(len(MAGIC))
-    while True:
-        at = file.tell()
-        head = file.read(len(MAGIC))
-        if head == MAGIC:  # another one follows
-            number += 1
+def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, Record]]:
+    """Each record with the number of its recording. Whatever does not end where the index says that a chunk begins is
+    damaged, and the chunk comes next.
+    """
+    size, number, at = file_bytes(file), 0, len(MAGIC)
+    places = [*_places(file), size]
+    while at < size:
+        if _magic(file, at):  # another one follows
+            number, at = number + 1, at + len(MAGIC)
             found.recordings, found.closed = number + 1, False
-            continue
-        file.seek(at)
         if found.closed:
-            found.beyond = os.fstat(file.fileno()).st_size - at
+            found.beyond = size - at
             return
+        file.seek(at)
+        end = places[min(bisect.bisect_right(places, at), len(places) - 1)]
         try:
-            one = mcap.record(file)
+            for record in records(file, end):
+                yield number, record
+                at = record.end
+                if record.kind == "Footer":
+                    found.closed, at = _magic(file, at), at + len(MAGIC)
+                    if not found.closed:
+                        found.cut = size - record.at
+                        return
+                    break
         except Cut as cut:
-            found.cut = cut.size
-            return
-        if one is None:
-            return
-        yield number, *one
-        if one[0] == Opcode.FOOTER:
-            found.closed = file.read(len(MAGIC)) == MAGIC
-            if not found.closed:
-                found.cut = os.fstat(file.fileno()).st_size - at
+            if _magic(file, at):
+                continue
+            if end == size:
+                found.cut = cut.size
                 return
+            found.damaged, at = found.damaged + 1, end
 
 
-def _inside(kind: int, data: bytes) -> Iterator[Any]:
-    from mcap.opcode import Opcode
-    from mcap.records import Channel, Chunk, Metadata, Schema
+def _magic(file: BinaryIO, at: int) -> bool:
+    file.seek(at)
+    return file.read(len(MAGIC)) == MAGIC
 
-    if kind == Opcode.CHUNK:
-        yield from mcap.inside(mcap.parsed(Chunk, data))
-    elif kind == Opcode.MESSAGE:
-        yield mcap.message(data)
-    elif kind in (kinds := {Opcode.METADATA: Metadata, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}):
-        yield mcap.parsed(kinds[Opcode(kind)], data)
+
+def _places(file: BinaryIO) -> list[int]:
+    """Where chunks begin, and the summary, if the file has an index of all."""
+    with contextlib.suppress(Unreadable):
+        index = Index(file)
+        return sorted({*(place.at for place in index.places), index.summary} - {0})
+    return []
