@@ -109,6 +109,8 @@ def heard(robot, touches, golden, seconds=0.06):
     with Sheets(model, data, robot, golden=golden, radius_m=0.005) as sheets:
         while data.time < seconds:
             sheets.step()
+        if golden:
+            sheets.settle()
         contacts = sheets.snapshot().contacts()
         true = []
         for number in range(data.ncon):

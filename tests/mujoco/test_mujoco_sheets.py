@@ -1,5 +1,6 @@
 """A robot in MuJoCo that wears sheets: which switch a ball closes, with what force, and what the driver says of it."""
 
+import contextlib
 import runpy
 from pathlib import Path
 
@@ -11,7 +12,8 @@ pytest.importorskip("mujoco")
 import mujoco
 from mujoco_rig import pressed, robot
 
-from contactfpga.mujoco import Sheets
+import contactfpga
+from contactfpga.mujoco import Sheets, wear
 from contactfpga.robot.body import Body, BodyError
 
 CYLINDER = 'surface = "cylinder"\nradius_mm = 40.0\n'
@@ -144,16 +146,48 @@ def test_a_link_that_the_model_lacks_is_refused_by_name(tmp_path):
         Sheets(model, mujoco.MjData(model), robot(tmp_path))
 
 
-def test_the_wrapper_of_the_example_feels(tmp_path):
+def environment(*pressed_robot):
+    """The example's, which the caller closes."""
     names = runpy.run_path(str(Path(__file__).parents[2] / "examples/arm/tactile_environment.py"))
-    toml = robot(tmp_path)
-    model, data = pressed(toml, [("link", 40.0, 70.0, 3.0)])
-    environment = names["TactileEnvironment"](model, data, toml, "link")
-    for _ in range(2):
-        assert not environment.reset()[-12:].any()
+    env = names["TactileEnvironment"](*pressed(*pressed_robot), pressed_robot[0], "link")
+    return contextlib.closing(env.sheets), env
+
+
+def test_the_wrapper_feels_begins_each_episode_untouched_and_says_that_a_board_is_dead(tmp_path):
+    closing, env = environment(robot(tmp_path), [("link", 40.0, 70.0, 3.0)])
+    with closing as sheets:
+        for _ in range(2):
+            assert not env.reset()[-12:].any()
+            assert not sheets["link"].contact
+            for _ in range(100):
+                seen = env.step([3.0])
+            assert seen[-12:-10] == pytest.approx([40.0, 70.0], abs=2)
+            assert sheets["link"].contact
+        sheets["link"].dead = True
+        with pytest.raises(contactfpga.NoData, match="no data of link"):
+            env.reset()
+
+
+def test_the_wrapper_knows_a_grip_all_round_by_its_x(tmp_path):
+    places_mm = np.arange(16) * 2 * np.pi * 45 / 16
+    closing, env = environment(robot(tmp_path, CLOSED), [("link", x, 70.0, 3.0) for x in places_mm.tolist()])
+    with closing:
         for _ in range(100):
-            seen = environment.step([3.0])
-        assert seen[-12:-10] == pytest.approx([40.0, 70.0], abs=2)
-        for _ in range(100):
-            environment.step([-1.0])
-    environment.sheets.close()
+            seen = env.step([3.0] * 16)
+    assert seen[-12:].tolist() == [-1.0, 70.0, 16.0, *[0.0] * 9]
+
+
+SOFT = """<mujoco><worldbody><body name="link"/><body name="soft" pos="0.075 0.075 0.01"><flexcomp name="soft" dim="3"
+type="grid" count="3 3 2" spacing="0.02 0.02 0.02" mass="0.5"><edge equality="true"/></flexcomp></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("foam", [False, True])
+def test_a_soft_body_presses_and_is_refused_under_foam(foam, tmp_path):
+    """Its contacts have no geom, whose number is -1; the foam's reaction would push the body of the last one."""
+    toml, spec = robot(tmp_path), mujoco.MjSpec.from_string(SOFT)
+    wear(spec, toml)
+    model = spec.compile()
+    refused = pytest.raises(BodyError, match="a soft body touches a sheet") if foam else contextlib.nullcontext()
+    with Sheets(model, mujoco.MjData(model), toml, golden=True, foam=foam) as sheets, refused:
+        assert settled(sheets).touches

@@ -1,5 +1,8 @@
 """`contactfpga view --mujoco`: the mouse pushes a simulated robot, and its reflex answers."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -46,6 +49,7 @@ def pushed(reflex, push_n, x_mm=X_MM):
     (copy,) = source.copies
     state = copy.states()["arm"]
     source.close()
+    assert not copy.sheets.data.qfrc_applied.any(), "a push is of its step alone"
     return float(copy.sheets.data.qvel[0]), state, copy
 
 
@@ -204,6 +208,15 @@ def test_a_drag_moves_an_obstacle_in_the_plane_that_faces_the_camera(eye, to, wa
     np.testing.assert_allclose(one.wanted_m, wanted, atol=1e-12)
 
 
+ARM = """<mujoco><asset><hfield name='h' nrow='2' ncol='3' size='1 2 0.3 0.1'/></asset>{before}<worldbody>
+<geom type='hfield' hfield='h' pos='0 0 -9'/><body name='arm' {arm}><joint name='j' axis='1 0 0'/>
+<geom size='0.1' pos='0 0.1 0'/></body>{beside}</worldbody></mujoco>"""
+REPEATED = "<replicate count='11' offset='1 0 0'>" * 3 + "<geom size='0.1'/>" + "</replicate>" * 3
+TENDON = (
+    """<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon><actuator><motor tendon='t'/></actuator>"""
+)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -213,14 +226,46 @@ def test_a_drag_moves_an_obstacle_in_the_plane_that_faces_the_camera(eye, to, wa
         ({"reflex": "absent.py"}, "absent.py', no file"),
         ({"reflex": str(HERE / "arm.py")}, "has no class with __call__"),
         ({"mujoco": None}, "--reflex is for a robot of --mujoco"),
+        ({"mujoco": "tendon.xml"}, "the first actuator of tendon.xml moves no hinge or slide"),
     ],
 )
-def test_bad_words_get_one_line(words, said):
+def test_bad_words_get_one_line(words, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("tendon.xml").write_text(ARM.format(before=TENDON, arm="", beside=""))
     named = opening.ViewRequest(**{"port": ROBOT, "mujoco": SCENE, "reflex": REFLEXES, **words})
     with pytest.raises(contactfpga.ContactFPGAError) as failed, opening.opened(named, http_port=0):
         pass
     assert said in str(failed.value)
     assert "\n" not in str(failed.value)
+
+
+def run_model(seconds):
+    source = SimulatedSource(ROBOT, "model.xml")
+    source.pace = Asked(0.0)
+    assert "arm" in {one.link for one in source.solids()}, "terrain, of number 0 as well, is no mesh"
+    goes_on(source, seconds)
+    source.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"before": "<size nuserdata='2000000000'/>"}, "more than 2 GiB or 20 s of processor time to load"),
+        ({"beside": REPEATED}, "ngeom is 1333; it must be 0 to 1000"),
+        ({"before": "<option timestep='0'/>"}, "timestep is 0.0; it must be 1e-05 to 0.1"),
+        ({"before": "<option iterations='100000'/>"}, "iterations is 100000; it must be 0 to 1000"),
+        ({"arm": "pos='nan 0 0'"}, "body_pos"),
+        ({"before": "<option gravity='0 0 1e30'/>"}, "MuJoCo says Nan, Inf or huge value in QACC"),
+    ],
+)
+def test_a_model_beyond_a_limit_gets_one_line_with_its_name(words, said, tmp_path, monkeypatch):
+    """Each in a folder that stays empty but for the model."""
+    monkeypatch.chdir(tmp_path)
+    Path("model.xml").write_text(ARM.format(**{"before": "", "arm": "", "beside": "", **words}))
+    with pytest.raises(contactfpga.ContactFPGAError, match=rf"^model.xml.*{said}") as failed:
+        run_model(0.1)
+    assert "\n" not in str(failed.value)
+    assert os.listdir() == ["model.xml"]
 
 
 def test_all_forms_are_drawn_closed_and_as_large_as_they_are():

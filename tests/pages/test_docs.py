@@ -29,7 +29,7 @@ def test_the_pages_have_examples():
 
 SLOW = {"docs/arm.md", "docs/body.md", "docs/haptics.md", "docs/several.md", "docs/stop.md", "docs/watch.md"}
 """Their examples compile boards of their own, or run an arm for seconds."""
-NEEDED = {"docs/ros.md": ("cyclonedds",), "docs/stop.md": ("cyclonedds", "mujoco")}
+NEEDED = {"docs/mujoco.md": ("mujoco",), "docs/ros.md": ("cyclonedds",), "docs/stop.md": ("cyclonedds", "mujoco")}
 """Packages of extras, without which a page is left out."""
 
 

@@ -36,6 +36,12 @@ def test_nothing_is_published_before_it_was_built_and_tried():
     assert jobs["attach"]["needs"] == jobs["pages"]["needs"] == "publish"
 
 
+def test_the_readmes_commands_run_with_the_oldest_and_the_newest_python_it_names():
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text())["jobs"]
+    named = re.search(r"Python (3\.\d+) to (3\.\d+)", (ROOT / "README.md").read_text()).groups()
+    assert sorted(one["python"] for one in jobs["bare"]["strategy"]["matrix"]["include"]) == list(named)
+
+
 @pytest.fixture
 def clone(tmp_path, monkeypatch):
     """A clone with one commit, of which a release is made."""

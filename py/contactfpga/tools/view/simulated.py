@@ -20,7 +20,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shortened, shown
 from contactfpga.robot.body import Body, LinkState, Snapshot
 from contactfpga.robot.body.kinematics import Pose
-from contactfpga.tools.view import obstacle, solids
+from contactfpga.tools.view import model_file, obstacle, solids
 from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.sources import SimulatedPace
 
@@ -151,8 +151,8 @@ class SimulatedSource:
         self.skin = KIT
         self.body = Body.load(robot)
         self._model = _compiled(self._parts, model, robot, self.body)
-        if self.reflexes and not self._model.nu:
-            raise ContactFPGAError(f"{model} has no actuator; --reflex needs one, a <velocity> servo of a joint")
+        if self.reflexes and not _turns_a_joint(self._model):
+            raise ContactFPGAError(f"the first actuator of {model} moves no hinge or slide, and --reflex commands it")
         self.copies: list[RobotCopy] = []
         self.links = {name: SharedLink() for name in self.body.links}
         self.obstacle = obstacle.Obstacle()
@@ -204,8 +204,17 @@ class SimulatedSource:
         for copy in self.copies:
             self.obstacle.place(self._model, copy.sheets.data)
             copy.step(fingers)
+            self._check(copy.sheets.data)
         self.simulated_s += step_s
         self.sweep.add(self.simulated_s, [max(map(copy.force_n, copy.sheets)) for copy in self.copies])
+
+    def _check(self, data: Any) -> None:
+        """Raises :class:`~contactfpga.ContactFPGAError` where MuJoCo warned, which may have begun anew."""
+        import mujoco
+
+        if (warned := np.flatnonzero(data.warning.number)).size:
+            said = mujoco.mju_warningText(int(warned[0]), int(data.warning.lastinfo[warned[0]]))
+            raise ContactFPGAError(f"{self.title}: MuJoCo says {said}")
 
     @property
     def share(self) -> float:
@@ -225,6 +234,8 @@ def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
 
     if not Path(path).is_file():
         raise ContactFPGAError(f"{path} is no file; --mujoco takes the MJCF or URDF of a robot")
+    model_file.check(path)
+    mujoco.set_mju_user_warning(lambda text: None)  # its own way is a file, MUJOCO_LOG.TXT; a step looks for them
     try:
         spec = mujoco.MjSpec.from_file(path)
         bodies = [spec.body(plan.frame) for plan in body.links.values()]
@@ -236,6 +247,15 @@ def _compiled(parts: Any, path: str, robot: str, body: Body) -> Any:
         if isinstance(error, ContactFPGAError):
             raise
         raise ContactFPGAError(f"{path}: MuJoCo says {shortened(' '.join(str(error).split()))}") from None
+
+
+def _turns_a_joint(model: Any) -> bool:
+    """Whether the first actuator has a joint with one angle or way."""
+    from mujoco import mjtJoint, mjtTrn
+
+    joints = (mjtTrn.mjTRN_JOINT, mjtTrn.mjTRN_JOINTINPARENT)
+    moved = model.actuator_trnid[:1, 0] if model.nu and int(model.actuator_trntype[0]) in joints else []
+    return any(int(model.jnt_type[one]) in (mjtJoint.mjJNT_HINGE, mjtJoint.mjJNT_SLIDE) for one in moved)
 
 
 def _reflexes(path: str | None) -> dict[str, Callable[[float], Reflex]]:

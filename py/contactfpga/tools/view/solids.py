@@ -47,7 +47,9 @@ def _solid(model: Any, number: int, worn: Collection[str]) -> Solid | None:
     import mujoco
 
     geom = model.geom(number)
-    made = _mesh(model, int(geom.dataid[0])) if geom.dataid[0] >= 0 else _form(int(geom.type[0]), geom.size)
+    kind, form = int(geom.type[0]), int(geom.dataid[0])
+    is_mesh = form >= 0 and kind != mujoco.mjtGeom.mjGEOM_HFIELD  # whose number is of terrain, which is not drawn
+    made = _mesh(model, form) if is_mesh else _form(kind, geom.size)
     if made is None:
         return None
     vertices, faces = made

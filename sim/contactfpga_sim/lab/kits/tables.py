@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import csv
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from contactfpga.boards import BOARDS
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
+from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
@@ -28,8 +30,15 @@ SEEDS = (1, 2, 3, 4, 5)
 """Seeds of place and route."""
 COVER = "| run, 6.4 mm, tiles |"
 PAPER = "| run, 6.4 mm, paper |"
-ARM = "| tiles | 6.4 | 0.4 | 5 |"
-ARM_PAPER = "| flush, point force | 10 | 1 | 5 |"
+PEAKS = {
+    "UART": "that an arm runs into anywhere, worst / mean",
+    "6 ms": "if the stop comes 6 ms late",
+    "limit alone": "if no stop comes and only the limit of torque holds",
+}
+"""Columns of :data:`PLACES`, and what a row of the README says of them."""
+PLACES = "docs/tables/arm-places.csv"
+PAPER_SHEET = ("flush, point force", 10.0, 1.0, 5.0)
+"""Face, pitch in mm, threshold in N and foam in mm of a row there."""
 
 
 class KitFigures(NamedTuple):
@@ -58,7 +67,6 @@ def headline(found: list[KitFigures]) -> str:
     """The README's table: both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
     fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
-    arm, paper_arm = (_worst_force(start) for start in (ARM, ARM_PAPER))
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
@@ -82,11 +90,7 @@ def headline(found: list[KitFigures]) -> str:
             *(f"**{fingers}**",) * 2,
             f"{paper_fingers} with the paper's switch and foam at this pitch",
         ),
-        (
-            "[Peak force on a human arm](docs/arm.md#touches-anywhere) that an arm runs into anywhere, worst / mean",
-            *(f"**{arm} N**",) * 2,
-            f"{paper_arm} N with the paper's sheet",
-        ),
+        *(_peak_row(way, found) for way in PEAKS),
     ]
     return writer.table_of(rows)
 
@@ -106,11 +110,25 @@ def _of_page(page: str, start: str, column: int) -> str:
     return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
 
 
-def _worst_force(start: str) -> str:
-    text = Path("docs/arm.md").read_text(encoding="utf-8")
-    line = next(line for line in text.splitlines() if line.startswith(start))
-    mean, worst = line.strip("|").split("|")[5].split(" / ")
-    return f"{worst.strip()} / {mean.strip()}"
+def _sheet(kit: Kit) -> tuple[str, float, float, float]:
+    cover = load_cover(kit.skin_path)
+    assert cover is not None
+    return ("tiles", kit.skin.pitch_x_mm, cover.switch.force_n, round(1e3 * cover.thickness_m, 3))
+
+
+def _peak_row(way: str, found: list[KitFigures]) -> tuple[str, ...]:
+    title = f"[Peak force on a human arm](docs/arm.md#touches-anywhere) {PEAKS[way]}"
+    kits_n = (f"**{_peak(sheet, way)} N**, {sheet[-1]:g} mm of foam" for sheet in (_sheet(one.kit) for one in found))
+    paper_n = f"{_peak(PAPER_SHEET, way)} N with the paper's sheet, {PAPER_SHEET[-1]:g} mm of foam"
+    return title, *kits_n, paper_n
+
+
+def _peak(sheet: tuple[str, float, float, float], way: str) -> str:
+    """Worst / mean in N."""
+    with open(PLACES, encoding="utf-8", newline="") as file:
+        of = {(row["face"], *map(float, list(row.values())[1:4])): row for row in csv.DictReader(file)}
+    mean, worst = of[sheet][f"{way}: mean / worst, N"].split(" / ")
+    return f"{worst} / {mean}"
 
 
 def times_table(found: list[KitFigures]) -> str:

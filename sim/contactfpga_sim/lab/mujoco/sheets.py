@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -49,7 +49,8 @@ class Sheets(Mapping[str, WornSheet]):
       bridge: the board's USB chip and its settings; by default that of the iCEBreaker as the driver sets it.
       seed: of the switches' closing forces and the units' noise.
 
-    Raises BodyError for a link that the model lacks, and OSError.
+    Raises BodyError for a link that the model lacks, and OSError; with ``foam`` :meth:`step` raises BodyError where a
+    soft body (flex) touches a sheet.
     """
 
     def __init__(
@@ -77,8 +78,7 @@ class Sheets(Mapping[str, WornSheet]):
         self._bodies = [_body(model, plan) for plan in self.body.links.values()]
         self._owner = _owners(model, self.body, self._bodies)
         self._springs = [elastic.stiffness(worn.ball) for worn in self._worn.values()] if foam else []
-        self._pushed: Floats = np.zeros(model.nv)  # what foam and fingers added to qfrc_applied
-        self._steps = 0
+        self._steps, self._still_s = 0, LEAD_S
         self._joints, self._history = _joints(model, self.body), JointHistory()
         self._every = max(1, round(1e-3 / model.opt.timestep))
         self._open(seed)
@@ -87,37 +87,64 @@ class Sheets(Mapping[str, WornSheet]):
         ports = {name: SteppedPort(worn, self.step, seed) for name, worn in self._worn.items()}
         for name, port in ports.items():
             self._worn[name].board = driver.open(port, self._worn[name].skin)
-        for name, port in ports.items():
-            while (worn := self._worn[name]).clock() < LEAD_S:  # frames go on coming
-                worn.run(min(LEAD_S, worn.clock() + LOOK_S))
+        self._wait()
+        for port in ports.values():
             port.still = False
+
+    def _wait(self) -> None:
+        """Runs the boards up to :meth:`clock` in small steps, as frames go on coming."""
+        for worn in self._worn.values():
+            while worn.clock() < self.clock():
+                worn.run(min(self.clock(), worn.clock() + LOOK_S))
 
     # ---- time
 
     def clock(self) -> float:
-        """Seconds since power-up: LEAD_S at MuJoCo's first step."""
-        return LEAD_S + self._steps * float(self.model.opt.timestep)
+        """Seconds since the boards' power-up: LEAD_S at MuJoCo's first step, and more with each :meth:`settle`."""
+        return self._still_s + self._steps * float(self.model.opt.timestep)
 
     def step(self) -> None:
         """Take MuJoCo's next step."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
-        self._note_joints()
-        pushed = np.zeros(model.nv)
-        foam = self._push(pushed) if self._springs else {}
-        fingers = [self._point(number, pushed) for number in range(len(self._bodies))]
-        data.qfrc_applied += pushed - self._pushed
-        self._pushed = pushed
-        mujoco.mj_step2(model, data)
-        self._press(foam, fingers)
+        if self._steps % self._every == 0:
+            self._note_joints()
+        self._advance(mujoco.mj_step2)
         self._steps += 1
         for worn in self._worn.values():
             worn.run(self.clock())
 
-    def reset(self) -> None:
-        """Reset MuJoCo's state. The boards go on, as if the robot were carried back."""
-        mujoco.mj_resetData(self.model, self.data)
-        self._pushed[:] = 0.0
+    def _advance(self, go: Callable[[Any, Any], None]) -> None:
+        """Calls ``go`` with the pushes of foam and fingers in ``qfrc_applied``, which is then the caller's again."""
+        data, pushed = self.data, np.zeros(self.model.nv)
+        foam = self._push(pushed) if self._springs else {}
+        fingers = [self._point(number, pushed) for number in range(len(self._bodies))]
+        applied = data.qfrc_applied.copy()
+        data.qfrc_applied += pushed
+        go(self.model, data)
+        data.qfrc_applied[:] = applied
+        self._press(foam, fingers)
+
+    def reset(self, key: int = -1) -> None:
+        """Reset MuJoCo's state, to the keyframe of this number if there is one, and :meth:`settle`."""
+        mujoco.mj_resetDataKeyframe(self.model, self.data, key)
+        self.settle()
+
+    def settle(self) -> None:
+        """Hold the robot still while the boards run, until programs know what touches now and nothing older.
+
+        Call it after a state of your own, such as ``data.qpos[:] = ...``. MuJoCo's time stands still.
+        """
+        mujoco.mj_forward(self.model, self.data)
+        self._advance(mujoco.mj_forward)
+        # Every frame from before is late then, that of a board that has gone silent, too.
+        plans = self.body.links.values()
+        bounce_us = max(one.skin.debounce_press_us + one.skin.debounce_release_us for one in plans)
+        still_s = LEAD_S + 1e-6 * bounce_us + max(one.late_s for one in plans)
+        self._history = JointHistory(gap_s=2 * still_s, ahead_s=2 * still_s)
+        self._note_joints()
+        self._still_s += still_s
+        self._wait()
 
     def _press(self, foam: Mapping[tuple[int, int], Floats], touches: list[list[SheetTouch]]) -> None:
         data, plans = self.data, list(self.body.links.values())
@@ -157,6 +184,8 @@ class Sheets(Mapping[str, WornSheet]):
             outward = (-1.0 if second else 1.0) * contact.frame[:3]
             force = -self._springs[owner] * max(0.0, -contact.dist) ** 1.5 * outward
             found[number, owner] = force
+            if contact.geom.min() < 0:  # a flex, whose force its corners would share
+                raise BodyError("a soft body touches a sheet, and foam=True pushes rigid ones alone; take foam=False")
             mine, other = contact.geom[int(second)], contact.geom[int(not second)]
             for geom, sign in ((mine, 1.0), (other, -1.0)):
                 mujoco.mj_applyFT(
@@ -165,7 +194,7 @@ class Sheets(Mapping[str, WornSheet]):
         return found
 
     def _note_joints(self) -> None:
-        if self._joints and self._steps % self._every == 0:
+        if self._joints:
             angles = {name: float(self.data.qpos[address]) for name, address in self._joints.items()}
             self._history.add(self.clock(), angles)
 
