@@ -113,7 +113,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     except ModuleNotFoundError as error:
         return interrupt.failed(_missing(args.command, args.extra, error))
     except MissingExtra as error:  # of a part that does not know which command it serves
-        return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
+        extras = ",".join(dict.fromkeys(filter(None, (args.extra, error.extra))))
+        return interrupt.failed(MissingExtra(error.what, extras))
     except ValueError as error:
         return interrupt.failed(error)
 
