@@ -15,7 +15,7 @@ from contactfpga.errors import MissingExtra
 from contactfpga.inputs.values import shortened, suggestion, visible_lines
 from contactfpga.shipped import with_pages
 from contactfpga.tools import commands
-from contactfpga.tools.console import interrupt
+from contactfpga.tools.console import interrupt, outputs
 
 COMMANDS = {
     "zones": "Show the contact zones live.",
@@ -107,7 +107,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(_first(), file=sys.stderr)
         return 2
     try:
-        with trusted(args.trust):
+        with trusted(args.trust), outputs.no_empty_folders():
             status: int = args.run(args)
             return status
     except ModuleNotFoundError as error:

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     layout = lay_out(skin, circuit, args.part, args.edge_mm)
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
-    text = files.completed(Path(file).read_text(encoding="utf-8"), found.circuit)
+    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit)
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline

@@ -107,7 +107,7 @@ def bring_up_skin(kit: Kit) -> Skin:
 
 def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
     path = outputs.file(name, "--skin-output")
-    text = kit.skin_path.read_text(encoding="utf-8")
+    text = kit.skin_path.read_text(encoding="utf-8-sig")
     tables = text[text.index("\n[") :] if "\n[" in text else ""
     write_text(
         path, f"# The {kit.name} kit's Skin for `contactfpga bringup`: it sends every cell.\n{skin.to_toml()}{tables}"
