@@ -27,9 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     lay = "Skin to lay out, with its tables [circuit] and [cover]."
     parser.add_argument("skin", metavar="SKIN.toml", nargs="?", help=lay)
     flags.kit(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", default="build/sheet", help="Folder for the files (default: build/sheet)."
-    )
+    flags.output_folder(parser, "build/sheet")
     part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
     parser.add_argument("--part", choices=tuple(SWITCHES), default="dome", help=part)
     margin = f"Board beyond the parts, in mm (default: {MARGIN_MM:g})."

@@ -16,9 +16,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.sheet(parser, "Skin of the board (default: the reference Skin).")
     pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
     parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", default="touch.vcd", help="File to write (default: %(default)s)."
-    )
+    flags.output(parser, "File to write (default: touch.vcd).", default="touch.vcd")
 
 
 def run(args: argparse.Namespace) -> int:

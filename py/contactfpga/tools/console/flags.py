@@ -136,9 +136,12 @@ def workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help=dask)
 
 
-def output(parser: argparse.ArgumentParser, folder: str) -> None:
-    usual = f"Folder for the results (default: {folder})."
-    parser.add_argument("--output", metavar="DIR", default=folder, help=usual)
+def output(parser: argparse.ArgumentParser, text: str, metavar: str = "FILE", default: str | None = None) -> None:
+    parser.add_argument("-o", "--output", metavar=metavar, default=default, help=text)
+
+
+def output_folder(parser: argparse.ArgumentParser, default: str) -> None:
+    output(parser, f"Folder for the results (default: {default}).", "DIR", default)
 
 
 def known(option: str, names: list[str] | None, choices: list[str]) -> list[str]:

@@ -55,7 +55,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.kit(parser)
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
     parser.add_argument("--skin-output", metavar="FILE", help=own)
-    parser.add_argument("--output", metavar="FILE", help="The report (default: bringup-NAME-DATE.md).")
+    flags.output(parser, "The report (default: bringup-NAME-DATE.md).")
     long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
     wait = "Seconds to wait for the board (default: 1)."
