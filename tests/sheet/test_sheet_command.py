@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -45,8 +46,10 @@ def test_all_files_are_there_and_the_circuit_is_complete(tmp_path, skin, capsys)
 def test_text_says_the_same(tmp_path, skin, capsys):
     cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--json"])
     answer = json.loads(capsys.readouterr().out)
-    cli.main(["sheet", str(skin), "-o", str(tmp_path / "out")])
+    cli.main(["sheet", str(skin), "-o", str(tmp_path / "my sheet")])
     said = capsys.readouterr().out
+    next_step = " ".join(said.partition("next: ")[2].split())
+    assert shlex.split(next_step) == ["contactfpga", "settle", "--skin", str(tmp_path / "my sheet" / "skin.toml")]
     assert "{:.1f} x {:.1f} mm".format(*answer["board_mm"]) in said
     for name, value in answer["circuit"].items():
         assert f"{name} = {value:g}\n" in said

@@ -26,6 +26,7 @@ from contactfpga.errors import (
     PortLost,
     ReadTimeout,
 )
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.faults import Faults
@@ -413,7 +414,7 @@ def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounter
     if stats.bytes == start:
         return BoardSilent(
             f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
-            f"`contactfpga doctor {name}` checks"
+            f"`contactfpga doctor {shell_words(name)}` checks"
         )
     seen = f"{stats.bytes - start} bytes came"
     if not stats.hellos and (numbers := sorted(said.numbers)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import shlex
 from collections.abc import Iterable
 from numbers import Real
 from typing import Any
@@ -77,3 +78,8 @@ def visible_lines(text: str) -> str:
 
 def _escaped(character: str) -> str:
     return character.encode("unicode_escape", "backslashreplace").decode("ascii")
+
+
+def shell_words(*words: object) -> str:
+    """A command for a message, to be pasted into a shell."""
+    return shlex.join(map(str, words))

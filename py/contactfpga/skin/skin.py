@@ -20,7 +20,7 @@ from contactfpga.choices.reports import REPORTS, ReportName
 from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown, suggestion
+from contactfpga.inputs.values import shell_words, shown, suggestion
 from contactfpga.skin import checks
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
@@ -172,7 +172,7 @@ class Skin:
         unknown = sorted(set(values) - set(known))
         if unknown:
             if unknown == ["sheets"]:
-                steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
+                steps = f"name one of them, or give all as --sheets {shell_words(path)} or {shell_words(f'sim://?sheets={path}')}"
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             known += ["[cover]", "[circuit]"]
             raise SkinError(f"{path}: unknown key {shown(unknown[0])}; {suggestion(unknown[0], known)}")

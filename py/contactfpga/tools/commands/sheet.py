@@ -17,6 +17,7 @@ from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawn import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
 from contactfpga.design.sheet.layout import MARGIN_MM
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
 
@@ -117,7 +118,7 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )
-    terminal.say(f"next: contactfpga settle --skin {answer['folder']}/skin.toml", hang=2)
+    terminal.say(f"next: contactfpga settle --skin {shell_words(answer['folder'] + '/skin.toml')}", hang=2)
     if answer["kicad"] is not None:
         terminal.say(f"KiCad: {len(answer['kicad'])} findings")
         for finding in answer["kicad"]:

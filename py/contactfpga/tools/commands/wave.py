@@ -6,6 +6,7 @@ import argparse
 import time
 
 from contactfpga import terminal
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, outputs
 
@@ -36,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
         ("touched", f"at {(touch.touched - touch.begins) * us:,.1f} us"),
         ("frame is sent", f"at {(touch.ends - touch.begins) * us:,.1f} us, with {touch.zones.pressed} pressed cells"),
         ("golden model", f"the same in each of {touch.ends:,} clocks ({time.monotonic() - started:.0f} s)"),
-        ("open it", f"gtkwave {vcd} {gtkw}"),
-        ("or", f"surfer {vcd} --command-file {surfer}"),
+        ("open it", shell_words("gtkwave", vcd, gtkw)),
+        ("or", shell_words("surfer", vcd, "--command-file", surfer)),
     ):
         terminal.say(f"{title:16}{what}", hang=16)
     return 0

@@ -26,7 +26,7 @@ from contactfpga.driver.health import Finding
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError, SkinMismatch
 from contactfpga.inputs.files import write_text
-from contactfpga.inputs.values import number_in
+from contactfpga.inputs.values import number_in, shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
 from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
@@ -114,8 +114,8 @@ def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
     )
     board = kit.board.name
     terminal.say(
-        f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then "
-        f"contactfpga bringup --kit {kit.name}",
+        f"{path} is written. Next: {shell_words('contactfpga', 'build', board, '--skin', path)}, "
+        f"contactfpga flash {board}, then contactfpga bringup --kit {kit.name}",
         hang=2,
     )
     return 0
