@@ -233,6 +233,8 @@ class Link:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()
                 if left <= 0:
+                    if explain := getattr(self.transport, "no_frame", None):  # its hellos are not the sheet's
+                        raise explain(timeout)
                     raise timed_out(self.transport.name, timeout, self.conversation, start, self.net)
                 if self.transport.threaded or self._reading is not None:
                     self.changed.wait(min(left, 1.0) if self.transport.threaded else READ_S)
