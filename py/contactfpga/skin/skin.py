@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from contactfpga.choices import scans
-from contactfpga.choices.choice import refuse_modules, trusted
+from contactfpga.choices.choice import look_in, modules, refuse_modules, trusted
 from contactfpga.choices.converters import Converter, ConverterName
 from contactfpga.choices.debounces import Debounce, DebounceName
 from contactfpga.choices.labellers import Labeller, LabellerName
@@ -166,6 +166,8 @@ class Skin:
         values = tomlfile.load(path, SkinError)
         with trusted(trust):
             refuse_modules(values, str(path))
+        for place in modules(values).values():
+            look_in(Path(path).parent, place)
         for table in ("cover", "circuit"):
             values.pop(table, None)
         known = [field.name for field in dataclasses.fields(cls)]

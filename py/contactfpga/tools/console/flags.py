@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
+from contactfpga.choices.choice import look_in
 from contactfpga.design import kits
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
@@ -60,8 +62,10 @@ def sheet_file(args: argparse.Namespace) -> str | None:
 
 
 def board(args: argparse.Namespace) -> BoardSpec | None:
-    """The board of ``--board``, its argument or ``--kit``; None if none is given."""
+    """The board of ``--board``, its argument or ``--kit``; None if none is given. A module may lie in this folder."""
     if not args.kit:
+        if args.board and ":" in args.board:
+            look_in(Path.cwd(), args.board)
         return find(args.board) if args.board else None
     found = kits.kit(args.kit).board
     if args.board and args.board != found.name:
