@@ -87,8 +87,8 @@ class MissingExtra(ContactFPGAError, ImportError):
     """A command needs an optional part of contactfpga that is not installed."""
 
     def __init__(self, what: str, extra: str):
-        self.what = what
-        """The command or function that needs the extra."""
+        self.what, self.extra = what, extra
+        """The command or function that needs the extra, and the extra; several with commas."""
         super().__init__(f"{what} needs more than is installed; install it with: {pip_install(extra)}")
 
 

@@ -226,7 +226,9 @@ def _run_all() -> list[DemoResult]:
 
 def _available(engine: str) -> bool:
     if engine.startswith("cocotb") and not bench_cocotb.available("verilator"):
-        terminal.say(f"{engine}: left out: it needs Verilator, perl, make and c++, one of which this machine lacks")
+        terminal.say(
+            f"{engine}: left out: it needs Verilator, perl, make and c++, and a path without spaces and quotes"
+        )
         return False
     return True
 

@@ -27,7 +27,7 @@ TOO_STRONG = "rows = 8\n[circuit]\ncolumn_pull_ohm = 2200\n"
 
 @pytest.fixture
 def skin_file(tmp_path):
-    path = tmp_path / "skin.toml"
+    path = tmp_path / "my skin.toml"
 
     def write(text):
         path.write_text(text)
@@ -87,8 +87,8 @@ def test_what_cannot_work_is_refused_before_anything_is_made(skin_file, capsys, 
     assert "a pressed column comes to" in said
     assert "at most 0.50 V are needed, 0.3 V below VIL" in said
     assert "column_pull_ohm = " in said
-    assert "contactfpga settle --skin" in said
-    assert list(tmp_path.iterdir()) == [tmp_path / "skin.toml"]
+    assert f"`contactfpga settle --skin {path!r}` shows all" in said
+    assert list(tmp_path.iterdir()) == [tmp_path / "my skin.toml"]
 
 
 def test_the_least_pull_that_is_recommended_does_and_less_does_not():

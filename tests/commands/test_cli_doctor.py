@@ -28,9 +28,10 @@ def test_doctor_finds_nothing_wrong(board, run):
     assert "0 lost, 0 damaged" in out
 
 
-def doctored(run, board, *arguments, skip=0):
+def doctored(run, board, *arguments, skip=0, cut=0):
     """What the command says of a board that sends frames for a while once it was asked; ``skip`` sequence numbers are
-    left out on the way. Once more where the machine lets the command wait, so that it opens the port behind them."""
+    left out on the way, and of the next frame all but ``cut`` bytes, which damages the one after it. Once more where
+    the machine lets the command wait, so that it opens the port behind them."""
 
     def said(pause_s):
         sent, ended = board.sent, threading.Event()
@@ -42,7 +43,7 @@ def doctored(run, board, *arguments, skip=0):
                 if index == 100:
                     for _ in range(skip):
                         board.frame()
-                board.send(board.frame())
+                board.send(board.frame()[: cut if index == 100 and cut else None])
             while not ended.wait(0.01):  # for one that is late
                 board.send(board.frame())
 
@@ -52,13 +53,25 @@ def doctored(run, board, *arguments, skip=0):
             finally:
                 ended.set()
 
-    return patiently(said, lambda found: f"{skip} lost, 0 damaged, 0 restarts" in found[1], (0.1, 2.0, 10.0))
+    return patiently(
+        said,
+        lambda found: f"{skip + 2 * bool(cut)} lost, {int(bool(cut))} damaged, 0 restarts" in found[1],
+        (0.1, 2.0, 10.0),
+    )
 
 
 def test_doctor_counts_what_is_lost(board, run):
     status, out, _ = doctored(run, board, "--seconds", 0.015, skip=7)
     assert status == 1
     assert "fault 7 lost, 0 damaged" in out
+
+
+@pytest.mark.parametrize(("skip", "told"), [(7, True), (0, False)])
+def test_doctor_asks_for_a_second_reader_where_bytes_are_taken_away(board, run, skip, told):
+    _, out, _ = doctored(run, board, "--seconds", 0.015, skip=skip, cut=5)
+    assert f"fault {skip + 2} lost, 1 damaged" in out
+    question = f"does another program read this port? `fuser {board.path}` lists them"
+    assert (question in " ".join(out.split())) == told
 
 
 def test_doctor_prints_one_json_object(board, run):

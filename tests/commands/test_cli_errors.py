@@ -41,6 +41,7 @@ def test_bad_skin_file_is_named(tmp_path, run):
 
 
 EXTRAS = [
+    (["record", "x.mcap", "sim://"], "contactfpga_sim.model.board.virtual", "record,sim"),
     (["zones", "--once", "sim://"], "rich.console", "cli"),
     (["board"], "contactfpga_sim.model.board.virtual", "sim"),
     (["build", "icestick"], "amaranth.build", "boards"),
@@ -53,12 +54,13 @@ EXTRAS = [
     (["fit", "bumper"], "rich.console", "chart"),
     (["fit", "bumper"], "scipy.optimize", "chart"),
     (["board"], "contactfpga_sim.model.board.pty_board", "sim"),
+    (["publish", "sim://"], "contactfpga_sim.model.board.virtual", "net,sim"),
     (["study", "arm"], "matplotlib.figure", "sim"),
     (["study", "arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
 ]
 
 
-@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:3]))
+@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:4]))
 def test_a_missing_extra_is_named_with_its_command(python, arguments, module, extra):
     code = f"""
 import sys

@@ -36,6 +36,12 @@ COMMANDS = {leaf.prog: called(leaf) for leaf in INTO_A_FOLDER} | {
 }
 
 
+def test_each_command_with_an_output_takes_the_short_option():
+    written = [options(leaf) for leaf in leaves() if "--output" in options(leaf)]
+    assert len(written) > 10
+    assert all(found.get("-o") is found["--output"] for found in written)
+
+
 @pytest.mark.parametrize("where", ["a file", "below a file", "a device"])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_folder_that_cannot_be_is_refused_before_the_work(name, where, tmp_path, worked, capsys):

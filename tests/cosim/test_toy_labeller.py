@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from toy_labeller import TOY
 import contactfpga
 from contactfpga import Skin, SkinError, boards
 from contactfpga.choices.choice import own_files
+from contactfpga.errors import UNSOLVED
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import methods, numbers, picture
@@ -67,6 +69,36 @@ def test_a_module_that_fails_is_refused_in_one_sentence(tmp_path, monkeypatch, t
         Skin(labeller="failing:TOY")
     with pytest.raises(SkinError, match=re.escape(f"the board 'failing:TOY' cannot be loaded: {reason}")):
         boards.find("failing:TOY")
+
+
+def test_a_module_is_found_beside_its_skin_and_only_with_trust(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    text = Path(toy_labeller.__file__).read_text().replace("toy_labeller:", "beside_it:")
+    try:
+        for folder in (tmp_path / "one", tmp_path / "other"):
+            folder.mkdir()
+            (folder / "beside_it.py").write_text(text)
+            (folder / "skin.toml").write_text('rows = 4\nlabeller = "beside_it:TOY"\n')
+        command = ["settle", "--skin", str(tmp_path / "one" / "skin.toml")]
+        assert cli.main(command) == 1
+        assert "allow that by --trust" in capsys.readouterr().err
+        assert "beside_it" not in sys.modules
+        assert cli.main([*command, "--trust"]) in (0, UNSOLVED)
+        with pytest.raises(SkinError, match=r"other/beside_it.py, but .*/one/beside_it.py has the same name; rename"):
+            Skin.load(tmp_path / "other" / "skin.toml", trust=True)
+    finally:
+        sys.modules.pop("beside_it", None)
+
+
+def test_a_board_is_found_in_this_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "board_in_it.py").write_text("from contactfpga.boards.ulx3s import ULX3S_85F as MINE\n")
+    try:
+        assert cli.main(["build", "board_in_it:MINE", "--wiring"]) == 0
+        assert "ULX3S" in capsys.readouterr().out
+    finally:
+        sys.modules.pop("board_in_it", None)
 
 
 @pytest.mark.slow

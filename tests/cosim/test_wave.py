@@ -1,7 +1,9 @@
 """`contactfpga wave`: its files are read back by another library, and hold what the sheet and the line did."""
 
 import bisect
+import dataclasses
 import io
+import re
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from vcd.reader import TokenKind, tokenize
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
+from contactfpga_sim.model import golden
 from contactfpga_sim.verify import wave
 
 SMALL = Skin(rows=4, columns=5, clock_hz=3_000_000, baud=750_000, settle_us=5.0, mask=((0, 0),))
@@ -81,6 +84,19 @@ def test_it_begins_before_the_touch_and_ends_with_the_frame(written):
     (rise,) = [when for when, level in contact if level]
     assert scan <= rise <= 3 * scan
     assert all(changes[0][0] == 0 for changes in signals.values())
+
+
+def test_a_gateware_that_is_wrong_is_told_in_one_line(tmp_path, monkeypatch, run):
+    def without_a_record(skin, timeline, cycles, **_):
+        trace = golden.predict(skin, timeline, cycles)
+        return dataclasses.replace(trace, records=trace.records[:-1])
+
+    monkeypatch.setattr(wave.bench_amaranth, "run", without_a_record)
+    (tmp_path / "skin.toml").write_text(SMALL.to_toml())
+    status, out, errors = run("wave", "--skin", tmp_path / "skin.toml", "-o", tmp_path / "new" / "touch.vcd")
+    assert (status, out, errors.count("\n")) == (1, "", 1)
+    assert re.search(r"gateware and golden model differ: first difference at cycle \d+, boundary 'records'", errors)
+    assert not (tmp_path / "new").exists()
 
 
 def test_layouts_name_signals_that_are_there(written):

@@ -98,13 +98,14 @@ def test_nothing_to_choose_from():
 # ---- the line of Fig. 9
 
 
-def test_line_of_measured_points(tmp_path):
+@pytest.mark.parametrize("header", ["force_n,deformation_m\n", "\ufeff"])
+def test_line_of_measured_points(tmp_path, header):
     random = np.random.default_rng(3)
     force = np.linspace(0, 30, 40)
     depth = 1e-4 + force / 9000 + random.normal(0, 2e-5, 40)
     file = tmp_path / "foam.csv"
     rows = "".join(f"{f},{d}\n" for f, d in zip(force, depth))
-    file.write_text("force_n,deformation_m\n" + rows + "\n# end\n")
+    file.write_text(header + rows + "\n# end\n")
     read = line.read(file)
     assert (read[0].tolist(), read[1].tolist()) == (force.tolist(), depth.tolist())
     fitted = line.fit(*read)

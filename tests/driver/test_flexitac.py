@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from fake_board import wait_until
+from fake_board import patiently, wait_until
 from scipy import ndimage
 
 import contactfpga
@@ -211,6 +211,34 @@ def test_what_is_no_address_is_told(address, message):
     with pytest.raises(AddressError) as caught:
         parse(address)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "options", "error", "said"),
+    [
+        ({}, "?rows=12", contactfpga.OnlyNoise, "AA 55 comes every 514 bytes: 16 rows of 32? If so, add rows=16"),
+        ({}, "?columns=30", contactfpga.OnlyNoise, "AA 55 comes every 514 bytes, no rows of 30; add rows=N and col"),
+        (
+            {"wrong": 1.0},
+            "",
+            contactfpga.OnlyNoise,
+            "no AA 55 comes again and again; is 2000000 the sheet's baud rate?",
+        ),
+        ({"hz": 1e-3}, "", contactfpga.BoardSilent, "not one byte came; is the sheet powered"),
+        ({}, "?frames=1000", contactfpga.ReadTimeout, "the first frames tell how cells read at rest; give it a longer"),
+    ],
+)
+def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, said):
+    def raised(timeout_s):
+        with pytest.raises(contactfpga.ReadTimeout) as caught:
+            contactfpga.open(f"flexitac://{sent.port}{options}", timeout=timeout_s)
+        return caught.value
+
+    with FlexitacSheet(Touch(), **sheet) as sent:
+        found = patiently(raised, lambda found: said in str(found), (0.2, 2.0, 9.0))
+    assert said in str(found)
+    assert type(found) is error
+    assert "hello" not in str(found)
 
 
 def test_a_port_that_is_not_there_is_told():

@@ -32,14 +32,14 @@ def make(folder, *arguments):
     return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=250)
 
 
-NAMES = ["a$(touch owned)b", "a`touch owned`b", 'a"b', "a'b", "a b", "a\tb", "a\nb", "a#b", "a:b"]
+NAMES = ["a$(touch owned)b", "a`touch owned`b", 'a"b', "a\tb", "a\nb", "a#b", "a:b"]
 
 
-@pytest.mark.parametrize(("name", "goal"), [*((name, "test") for name in NAMES), ("a b", "check"), ("a b", "lint")])
+@pytest.mark.parametrize(("name", "goal"), [*((name, "test") for name in NAMES), ("a:b", "check"), ("a:b", "lint")])
 def test_a_folder_that_make_cannot_build_in_is_told(tmp_path, name, goal):
     done = make(clone(tmp_path / name), goal)
     assert done.returncode == 2
-    assert "The path of this folder contains a space or one of" in done.stderr
+    assert "The path of this folder contains one of" in done.stderr
     assert not list(tmp_path.rglob("owned"))
 
 
@@ -50,7 +50,7 @@ def test_a_folder_with_a_control_character_is_told_without_it(tmp_path):
     assert "\x1b[31mb\n    " not in done.stderr
 
 
-@pytest.mark.parametrize("name", ["plain-1.2_x@y+z", "a,b", "ünï", "a~b"])
+@pytest.mark.parametrize("name", ["plain-1.2_x@y+z", "a,b", "ünï", "a~b", "a (copy) b", "R&D", "Bob's"])
 def test_other_folders_will_do(tmp_path, name):
     assert "The path of this folder" not in make(clone(tmp_path / name), "check").stderr
 

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import types
 from itertools import chain
 from pathlib import Path
 
@@ -48,6 +49,8 @@ def test_all_names_of_the_package_are_there():
     for name in contactfpga.__all__:
         assert getattr(contactfpga, name).__class__
         assert name in dir(contactfpga)
+    shown = {name for name in dir(contactfpga) if not name.startswith("_")} - set(contactfpga.__all__)
+    assert all(isinstance(getattr(contactfpga, name), types.ModuleType) for name in shown), shown
     assert set(contactfpga._PLACES) == set(contactfpga.__all__) - {"__version__"}
     assert contactfpga.skin.sheet.__name__ == "contactfpga.skin.sheet"
     with pytest.raises(AttributeError, match="module 'contactfpga' has no attribute 'zonse'"):

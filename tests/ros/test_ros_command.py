@@ -29,6 +29,7 @@ def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
     [
         (["--namespace", "a b"], "namespace is 'a b'; it has letters, digits and _, and / between parts"),
         (["--frame", "a b"], "frame is 'a b'; a frame's name has letters, digits"),
+        (["--parent", "/base"], "parent is '/base'; a frame's name has letters, digits, and _ / ~ . -, and begins"),
         (["--friction", "0.5"], "--friction needs --units: it is used for forces only"),
         (["--seconds", "1", "nowhere"], "nowhere cannot be opened"),
     ],

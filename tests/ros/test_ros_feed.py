@@ -185,14 +185,14 @@ def test_the_sheets_frame_is_published_where_its_parent_is_named():
 
 def test_forces_are_published_at_their_contacts():
     around = [(0.0, 0.1, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="bumper")
+    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="/bumper")
 
     def felt(zones, tracks):
         return contacts(cells.wrench([1.0, 2.0, 3.0]), zones, Plane(), tracks=tracks)
 
-    sent, _ = fed([frame(0, [(3, 2)])], felt=felt)
+    sent, _ = fed([frame(0, [(3, 2)])], felt=felt, skin=SKIN.replace(name="/arm"))
     (wrench,), (found,) = sent.of("wrench"), sent.of("contacts")
-    assert (wrench.header.frame_id, found.header.frame_id) == ("bumper", "skin")
+    assert (wrench.header.frame_id, found.header.frame_id) == ("bumper", "arm")  # tf2 refuses a leading slash
     assert wrench.wrench.force.z == pytest.approx(-6.0)
     assert found.contacts[0].wrench.force.z == pytest.approx(-6.0, rel=1e-3)
 
@@ -201,6 +201,7 @@ def test_forces_are_published_at_their_contacts():
     ("given", "said"),
     [
         ({"frame": "a b"}, "frame is 'a b'; a frame's name has letters"),
+        ({"frame": "/arm"}, "frame is '/arm'; .*begins with no slash"),
         ({"place_m": (1.0, 2.0)}, "place_m is .*; it must be three finite numbers"),
         ({"turn_rad": (1.0, 2.0, float("nan"))}, "turn_rad is .*; it must be three finite numbers"),
         ({"zones_hz": 0.0}, "zones_hz is 0.0; it must be above 0 and at most 100000"),

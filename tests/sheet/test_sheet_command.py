@@ -2,7 +2,7 @@
 
 import json
 import re
-import shutil
+import shlex
 from pathlib import Path
 
 import pytest
@@ -25,7 +25,8 @@ ALL = {
 @pytest.fixture
 def skin(tmp_path):
     path = tmp_path / "my.toml"
-    path.write_text("rows = 4\ncolumns = 4\npitch_x_mm = 6.4\npitch_y_mm = 6.4\n")
+    text = "rows = 4\ncolumns = 4\npitch_x_mm = 6.4\npitch_y_mm = 6.4\n"
+    path.write_text(text, encoding="utf-8-sig")  # with a byte order mark, as some editors write it
     return path
 
 
@@ -45,18 +46,24 @@ def test_all_files_are_there_and_the_circuit_is_complete(tmp_path, skin, capsys)
 def test_text_says_the_same(tmp_path, skin, capsys):
     cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--json"])
     answer = json.loads(capsys.readouterr().out)
-    cli.main(["sheet", str(skin), "-o", str(tmp_path / "out")])
+    cli.main(["sheet", str(skin), "-o", str(tmp_path / "my sheet")])
     said = capsys.readouterr().out
+    next_step = " ".join(said.partition("next: ")[2].split())
+    assert shlex.split(next_step) == ["contactfpga", "settle", "--skin", str(tmp_path / "my sheet" / "skin.toml")]
     assert "{:.1f} x {:.1f} mm".format(*answer["board_mm"]) in said
     for name, value in answer["circuit"].items():
         assert f"{name} = {value:g}\n" in said
     assert "16 of 5.8 mm, 0.6 mm apart" in said
 
 
-def test_a_cell_finer_than_its_parts_is_refused_in_one_line(tmp_path, capsys):
-    shutil.copy(examples() / "tiles.toml", tmp_path)
-    assert cli.main(["sheet", str(tmp_path / "tiles.toml"), "-o", str(tmp_path / "out"), "--part", "tact"]) == 1
-    assert "pitch_x_mm is 6.4; a cell with TACT_4.5MM" in capsys.readouterr().err
+@pytest.mark.parametrize(("pitch", "step"), [(6.4, "a larger pitch, or the part dome\n"), (5.08, "a larger pitch\n")])
+def test_a_cell_finer_than_its_parts_is_refused_in_one_line(tmp_path, skin, capsys, pitch, step):
+    skin.write_text(skin.read_text().replace("6.4", str(pitch)))
+    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "new" / "out"), "--part", "tact"]) == 1
+    said = capsys.readouterr().err
+    assert f"pitch_x_mm is {pitch}; a cell with TACT_4.5MM" in said
+    assert said.endswith(f"choose {step}")
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.skipif(not check.there(), reason="KiCad 6 is not installed")

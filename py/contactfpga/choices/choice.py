@@ -7,6 +7,7 @@ import contextvars
 import dataclasses
 import importlib
 import importlib.util
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,13 +42,32 @@ def refuse_modules(values: Mapping[str, Any], source: str) -> None:
     """Raise SkinError if the Skin from ``source`` names a module, except inside :func:`trusted`."""
     if trusting():
         return
-    for field in FIELDS:
-        value = values.get(field)
-        if isinstance(value, str) and ":" in value:
-            raise SkinError(
-                f"{source}: {field} is {shown(value)}, a module that would be imported and so run; "
-                "if you know its code, allow that by --trust (in Python by trust=True)"
-            )
+    for field, value in modules(values).items():
+        raise SkinError(
+            f"{source}: {field} is {shown(value)}, a module that would be imported and so run; "
+            "if you know its code, allow that by --trust (in Python by trust=True)"
+        )
+
+
+def modules(values: Mapping[str, Any]) -> dict[str, str]:
+    """Each ``module:attribute`` that a Skin's values name, by field."""
+    found = {field: values.get(field) for field in FIELDS}
+    return {field: value for field, value in found.items() if isinstance(value, str) and ":" in value}
+
+
+def look_in(folder: Path, place: str) -> None:
+    """Let Python find the module of a trusted ``module:attribute`` in this folder. Raises SkinError if it is there and
+    another module has its name, because that one would run."""
+    folder, name = folder.resolve(), place.partition(":")[0].partition(".")[0]
+    file = next((file for file in (folder / f"{name}.py", folder / name / "__init__.py") if file.is_file()), None)
+    if file is None:
+        return
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))  # to stay, as worker processes look there, too; last, so that it hides no module
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.origin is None or not Path(spec.origin).exists() or not file.samefile(spec.origin):
+        origin = None if spec is None else spec.origin
+        raise SkinError(f"{shown(place)} is in {file}, but {origin} has the same name; rename your module")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -113,9 +133,7 @@ def load_own(place: str, what: str) -> Any:
 
 def own_files(skin: object) -> set[Path]:
     """Module files of a Skin's own choices, for cache keys."""
-    own = [
-        load(value) for value in (getattr(skin, field) for field in FIELDS) if isinstance(value, str) and ":" in value
-    ]
+    own = [load(place) for place in modules({field: getattr(skin, field) for field in FIELDS}).values()]
     places = {place for one in own for place in (one.name, one.gateware, one.golden) if place}
     specs = [importlib.util.find_spec(place.partition(":")[0]) for place in places]
     return {Path(spec.origin) for spec in specs if spec and spec.origin}

@@ -8,11 +8,15 @@ numbers, times or checks, so a frame counts only if the next one's AA 55 follows
 from __future__ import annotations
 
 import dataclasses
+import re
+from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 
-from contactfpga.driver.address import Flexitac
+from contactfpga.driver.address import FLEXITAC_LIMITS, Flexitac
 from contactfpga.driver.transport import SerialTransport
+from contactfpga.errors import BoardSilent, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire import framing
@@ -82,6 +86,9 @@ class Heard:
     """Request number in current frames."""
 
 
+KEPT_BYTES = 16_384
+"""Number of last bytes that say why no frame came: four of the largest frames."""
+
 HELLO_US = 500_000
 """Interval of hellos, by which a network reader knows the time after a break."""
 
@@ -111,11 +118,14 @@ class FlexitacPort:
         self._sent = 0
         self._out = bytearray()
         self._port = SerialTransport(address.device, address.baud)
-        self._begun_s = self._port.clock()
+        self._begun_s = self._came_s = self._port.clock()
+        self._last = b""
         self._time_us = self._greeted_us = 0
 
     def read(self, timeout_s: float) -> bytes:
         data = self._port.read(0.0 if self._out else timeout_s)
+        if data:
+            self._came_s, self._last = self._port.clock(), (self._last + data)[-KEPT_BYTES:]
         frames = self._framer.take(data) if data else []
         now_us = int((self._port.clock() - self._begun_s) * 1e6)
         for number, readings in enumerate(frames):
@@ -176,8 +186,33 @@ class FlexitacPort:
         body += word.to_bytes(widths.trailer_bytes - 1, "little") + bytes([framing.last_byte(KINDS["cells"])])
         return framing.seal(body, check_prefix(self._skin))
 
+    def no_frame(self, timeout_s: float) -> ReadTimeout:
+        """The error where no frame came within ``timeout_s`` seconds, by what the sheet itself sent."""
+        head, skin = f"{self.name}: no frame within {timeout_s:g} s", self._skin
+        if self._port.clock() - self._came_s >= timeout_s:
+            return BoardSilent(f"{head}, not one byte came; is the sheet powered, and is this its port?")
+        gap = _usual_gap(self._last)
+        rows, rest = divmod(gap - len(MARK), skin.columns)
+        if gap == skin.rows * skin.columns + len(MARK):
+            return ReadTimeout(f"{head}; the first frames tell how cells read at rest; give it a longer timeout")
+        if rows < 1:
+            fault = f"no AA 55 comes again and again; is {skin.baud} the sheet's baud rate? If not, add baud=N"
+        elif rest or rows > FLEXITAC_LIMITS["rows"][1]:
+            fault = f"AA 55 comes every {gap} bytes, no rows of {skin.columns}; add rows=N and columns=N of the sheet"
+        else:
+            fault = f"AA 55 comes every {gap} bytes: {rows} rows of {skin.columns}? If so, add rows={rows}"
+        return OnlyNoise(f"{head}; bytes came, but {fault}")
+
     def clock(self) -> float:
         return self._port.clock()
 
     def close(self) -> None:
         self._port.close()
+
+
+def _usual_gap(data: bytes) -> int:
+    """The distance of most marks from the next one; 0 where there is none."""
+    places = [found.start() for found in re.finditer(re.escape(MARK), data)]
+    gaps = Counter(later - earlier for earlier, later in pairwise(places))
+    ((gap, count),) = gaps.most_common(1) or [(0, 0)]
+    return gap if count > 1 and 2 * count >= gaps.total() else 0

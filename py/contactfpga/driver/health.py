@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from contactfpga.driver import finding, native
+from contactfpga.driver.address import FLEXITAC, SheetOf
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
+from contactfpga.inputs.values import shell_words
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.hello import report_of
 from contactfpga.zones.units import only
@@ -95,7 +97,12 @@ def hello(board: Board) -> Iterator[Finding]:
         f"connectivity {sheet.connectivity}, {report_of(sheet)}, {board.clock_hz / 1e6:g} MHz, {board.baud} baud, "
         f"fingerprint {board.fingerprint.hex()}"
     )
-    yield Finding("ok", f"{board.port} says hello: {facts}")
+    yield Finding("ok", f"{board.port} {'is read as' if _greeted_here(board) else 'says hello'}: {facts}")
+
+
+def _greeted_here(board: Board) -> bool:
+    """Whether this computer makes the hellos, as the sheet says none."""
+    return board.port.startswith(FLEXITAC)
 
 
 def reader(board: Board) -> Iterator[Finding]:
@@ -159,6 +166,17 @@ def units(board: Board) -> Iterator[Finding]:
         yield Finding("note", "no threshold is set: the pressure units cannot raise contact")
 
 
+def _second_reader(board: Board) -> str:
+    """Question about a program that takes bytes away, as `cat` does: more frames than each damaged packet explains."""
+    damaged = board.stats.damaged.total()
+    if "://" in board.port or not 0 < 2 * damaged < board.stats.lost:
+        return ""
+    sheet = SheetOf.parse(board.port)
+    port = board.port if sheet is None else sheet.port
+    named = "" if sys.platform == "win32" else f" `{shell_words('fuser', port)}` lists them"
+    return f"; does another program read this port?{named}"
+
+
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     """Count frames and losses over some seconds of device time."""
     try:
@@ -175,9 +193,8 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
             break
     yield from clock((zones.time_us - first.time_us) / 1e6, board.clock() - begun)
     stats = board.stats
-    yield Finding(
-        "ok", f"{stats.frames} frames, {stats.hellos} hellos in {(zones.time_us - first.time_us) / 1e6:.2f} s"
-    )
+    hellos = "" if _greeted_here(board) else f", {stats.hellos} hellos"
+    yield Finding("ok", f"{stats.frames} frames{hellos} in {(zones.time_us - first.time_us) / 1e6:.2f} s")
     if stats.overwritten:
         yield Finding(
             "note",
@@ -189,7 +206,7 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
         )
     faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
     told = ", ".join(f"{number} {name}" for name, number in faults.items())
-    yield Finding("fault" if any(faults.values()) else "ok", told)
+    yield Finding("fault" if any(faults.values()) else "ok", f"{told}{_second_reader(board)}")
     yield from lines(board, zones)
     yield from units(board)
     for flag in sorted(zones.flags - {"fault"}):

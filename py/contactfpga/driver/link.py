@@ -26,6 +26,7 @@ from contactfpga.errors import (
     PortLost,
     ReadTimeout,
 )
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.faults import Faults
@@ -232,6 +233,8 @@ class Link:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()
                 if left <= 0:
+                    if explain := getattr(self.transport, "no_frame", None):  # its hellos are not the sheet's
+                        raise explain(timeout)
                     raise timed_out(self.transport.name, timeout, self.conversation, start, self.net)
                 if self.transport.threaded or self._reading is not None:
                     self.changed.wait(min(left, 1.0) if self.transport.threaded else READ_S)
@@ -413,7 +416,7 @@ def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounter
     if stats.bytes == start:
         return BoardSilent(
             f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
-            f"`contactfpga doctor {name}` checks"
+            f"`contactfpga doctor {shell_words(name)}` checks"
         )
     seen = f"{stats.bytes - start} bytes came"
     if not stats.hellos and (numbers := sorted(said.numbers)):

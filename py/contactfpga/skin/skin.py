@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from contactfpga.choices import scans
-from contactfpga.choices.choice import refuse_modules, trusted
+from contactfpga.choices.choice import look_in, modules, refuse_modules, trusted
 from contactfpga.choices.converters import Converter, ConverterName
 from contactfpga.choices.debounces import Debounce, DebounceName
 from contactfpga.choices.labellers import Labeller, LabellerName
@@ -20,7 +20,7 @@ from contactfpga.choices.reports import REPORTS, ReportName
 from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown, suggestion
+from contactfpga.inputs.values import shell_words, shown, suggestion
 from contactfpga.skin import checks
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
@@ -166,13 +166,15 @@ class Skin:
         values = tomlfile.load(path, SkinError)
         with trusted(trust):
             refuse_modules(values, str(path))
+        for place in modules(values).values():
+            look_in(Path(path).parent, place)
         for table in ("cover", "circuit"):
             values.pop(table, None)
         known = [field.name for field in dataclasses.fields(cls)]
         unknown = sorted(set(values) - set(known))
         if unknown:
             if unknown == ["sheets"]:
-                steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
+                steps = f"name one of them, or give all as --sheets {shell_words(path)} or {shell_words(f'sim://?sheets={path}')}"
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             known += ["[cover]", "[circuit]"]
             raise SkinError(f"{path}: unknown key {shown(unknown[0])}; {suggestion(unknown[0], known)}")

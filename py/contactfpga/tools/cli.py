@@ -15,7 +15,7 @@ from contactfpga.errors import MissingExtra
 from contactfpga.inputs.values import shortened, suggestion, visible_lines
 from contactfpga.shipped import with_pages
 from contactfpga.tools import commands
-from contactfpga.tools.console import interrupt
+from contactfpga.tools.console import interrupt, outputs
 
 COMMANDS = {
     "zones": "Show the contact zones live.",
@@ -107,13 +107,14 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(_first(), file=sys.stderr)
         return 2
     try:
-        with trusted(args.trust):
+        with trusted(args.trust), outputs.no_empty_folders():
             status: int = args.run(args)
             return status
     except ModuleNotFoundError as error:
         return interrupt.failed(_missing(args.command, args.extra, error))
     except MissingExtra as error:  # of a part that does not know which command it serves
-        return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
+        extras = ",".join(dict.fromkeys(filter(None, (args.extra, error.extra))))
+        return interrupt.failed(MissingExtra(error.what, extras))
     except ValueError as error:
         return interrupt.failed(error)
 

@@ -12,6 +12,7 @@ from contactfpga.design.circuit import patterns, phases, transient
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels, Phase
 from contactfpga.design.circuit.values import Circuit, CircuitError, load_circuit
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 
 NOISE_V = 0.3
@@ -159,5 +160,5 @@ def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
         try:
             check(circuit, skin)
         except CircuitError as error:
-            raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {path}` shows all") from None
+            raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {shell_words(path)}` shows all") from None
     return circuit

@@ -14,7 +14,7 @@ from contactfpga.boards import wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import strip
 from contactfpga.design.sheet.drawn import CLEARANCE_MM, EDGE_MM, TRACK_MM, VIA_MM, Drawing, Hole
-from contactfpga.design.sheet.parts import DIODE, DIODE_VIA, SheetError, SwitchPart, find_switch
+from contactfpga.design.sheet.parts import DIODE, DIODE_VIA, SWITCHES, SheetError, SwitchPart, find_switch
 from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin
 
@@ -78,16 +78,19 @@ def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
     return wide, high
 
 
+def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:
+    pitches = ("pitch_x_mm", skin.pitch_x_mm), ("pitch_y_mm", skin.pitch_y_mm)
+    limits = zip(pitches, smallest_pitch(skin, switch), strict=True)
+    return [(name, pitch, limit) for (name, pitch), limit in limits if pitch < limit - 1e-9]
+
+
 def _check(skin: Skin, switch: SwitchPart) -> None:
-    limits = smallest_pitch(skin, switch)
-    for name, pitch, limit in zip(
-        ("pitch_x_mm", "pitch_y_mm"), (skin.pitch_x_mm, skin.pitch_y_mm), limits, strict=True
-    ):
-        if pitch < limit - 1e-9:
-            raise SheetError(
-                f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
-                "choose a larger pitch or a smaller part"
-            )
+    for name, pitch, limit in _too_fine(skin, switch):
+        others = "".join(f", or the part {part}" for part, other in SWITCHES.items() if not _too_fine(skin, other))
+        raise SheetError(
+            f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
+            f"choose a larger pitch{others}"
+        )
 
 
 class _Matrix:

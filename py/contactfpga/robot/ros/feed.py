@@ -181,7 +181,7 @@ class Feed:
         self._tracker = Tracker()
         self._events: list[Event] = []
         self._restarted = False
-        self._frame = self.settings.frame or board.name or "skin"
+        self._frame = self.settings.frame or board.name.lstrip("/") or "skin"  # tf2 refuses a slash before it
         self._rim = outline(board.sheet)
         self._last: tuple[Zones, Tracks] | None = None
         self._forces: Contacts | None = None
@@ -226,7 +226,7 @@ class Feed:
         self._put("contacts", convert.contacts(tracks.active, head, self._forces))
         if self._forces is not None:
             total = self._forces.wrench
-            self._put("wrench", convert.wrench(total, head | {"frame_id": total.frame or self._frame}))
+            self._put("wrench", convert.wrench(total, head | {"frame_id": total.frame.lstrip("/") or self._frame}))
         self._events, self._restarted = [], False
 
     def _wanted(self, zones: Zones) -> bool:

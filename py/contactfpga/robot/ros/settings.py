@@ -62,8 +62,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("frame", "parent"):
-            if not re.fullmatch(r"[A-Za-z0-9_/~.-]*", text := getattr(self, name)):
-                raise ValueError(f"{name} is {shown(text)}; a frame's name has letters, digits, and _ / ~ . -")
+            if not re.fullmatch(r"(?!/)[A-Za-z0-9_/~.-]*", text := getattr(self, name)):
+                what = "a frame's name has letters, digits, and _ / ~ . -, and begins with no slash, which tf2 refuses"
+                raise ValueError(f"{name} is {shown(text)}; {what}")
         for name in ("place_m", "turn_rad"):
             values = getattr(self, name)
             if len(values) != 3 or not all(is_finite(one) for one in values):

@@ -29,8 +29,7 @@ BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec.
 def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
     flags.design(parser, "Skin to build (default: one that fits the board).")
-    output = "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit)."
-    parser.add_argument("--output", metavar="DIR", help=output)
+    flags.output(parser, "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit).", "DIR")
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
     check = "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would."

@@ -51,7 +51,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--quick", action="store_true", help="Do not check which of the refused Skins with as many wires are cheaper."
     )
     flags.workers(parser)
-    parser.add_argument("--output", metavar="FILE", help="Write the Skin to this TOML file.")
+    flags.output(parser, "Write the Skin to this TOML file.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
 
 

@@ -13,7 +13,7 @@ EXTRA = "sim"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.sheet(parser, "Skin of the core (default: the reference Skin).")
-    parser.add_argument("-o", "--output", metavar="DIR", default="build/ip", help="Folder (default: %(default)s).")
+    flags.output_folder(parser, "build/ip")
 
 
 def run(args: argparse.Namespace) -> int:

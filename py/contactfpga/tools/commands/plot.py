@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from contactfpga import terminal
-from contactfpga.tools.console import outputs
+from contactfpga.tools.console import flags, outputs
 
 EXTRA = "view"
 
@@ -16,8 +16,7 @@ ENDINGS = (".png", ".svg")
 def add_flags(parser: argparse.ArgumentParser) -> None:
     what = "File of `contactfpga record` or of `contactfpga zones --record`."
     parser.add_argument("recording", metavar="RECORDING", help=what)
-    file = "PNG or SVG, by its ending (default: RECORDING.png, in this folder)."
-    parser.add_argument("--output", metavar="FILE", help=file)
+    flags.output(parser, "PNG or SVG, by its ending (default: RECORDING.png, in this folder).")
     link = "Board to draw from a recording of several (default: the first)."
     parser.add_argument("--link", metavar="NAME", help=link)
 

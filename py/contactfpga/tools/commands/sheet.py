@@ -17,6 +17,7 @@ from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawn import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
 from contactfpga.design.sheet.layout import MARGIN_MM
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs
 
@@ -27,9 +28,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     lay = "Skin to lay out, with its tables [circuit] and [cover]."
     parser.add_argument("skin", metavar="SKIN.toml", nargs="?", help=lay)
     flags.kit(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", default="build/sheet", help="Folder for the files (default: build/sheet)."
-    )
+    flags.output_folder(parser, "build/sheet")
     part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
     parser.add_argument("--part", choices=tuple(SWITCHES), default="dome", help=part)
     margin = f"Board beyond the parts, in mm (default: {MARGIN_MM:g})."
@@ -58,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     layout = lay_out(skin, circuit, args.part, args.edge_mm)
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
-    text = files.completed(Path(file).read_text(encoding="utf-8"), found.circuit)
+    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit)
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
@@ -119,7 +118,7 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )
-    terminal.say(f"next: contactfpga settle --skin {answer['folder']}/skin.toml", hang=2)
+    terminal.say(f"next: contactfpga settle --skin {shell_words(answer['folder'] + '/skin.toml')}", hang=2)
     if answer["kicad"] is not None:
         terminal.say(f"KiCad: {len(answer['kicad'])} findings")
         for finding in answer["kicad"]:

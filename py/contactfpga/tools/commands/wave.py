@@ -6,6 +6,7 @@ import argparse
 import time
 
 from contactfpga import terminal
+from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, outputs
 
@@ -16,9 +17,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.sheet(parser, "Skin of the board (default: the reference Skin).")
     pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
     parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", default="touch.vcd", help="File to write (default: %(default)s)."
-    )
+    flags.output(parser, "File to write (default: touch.vcd).", default="touch.vcd")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
         ("touched", f"at {(touch.touched - touch.begins) * us:,.1f} us"),
         ("frame is sent", f"at {(touch.ends - touch.begins) * us:,.1f} us, with {touch.zones.pressed} pressed cells"),
         ("golden model", f"the same in each of {touch.ends:,} clocks ({time.monotonic() - started:.0f} s)"),
-        ("open it", f"gtkwave {vcd} {gtkw}"),
-        ("or", f"surfer {vcd} --command-file {surfer}"),
+        ("open it", shell_words("gtkwave", vcd, gtkw)),
+        ("or", shell_words("surfer", vcd, "--command-file", surfer)),
     ):
         terminal.say(f"{title:16}{what}", hang=16)
     return 0

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
+from contactfpga.choices.choice import look_in
 from contactfpga.design import kits
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
@@ -60,8 +62,10 @@ def sheet_file(args: argparse.Namespace) -> str | None:
 
 
 def board(args: argparse.Namespace) -> BoardSpec | None:
-    """The board of ``--board``, its argument or ``--kit``; None if none is given."""
+    """The board of ``--board``, its argument or ``--kit``; None if none is given. A module may lie in this folder."""
     if not args.kit:
+        if args.board and ":" in args.board:
+            look_in(Path.cwd(), args.board)
         return find(args.board) if args.board else None
     found = kits.kit(args.kit).board
     if args.board and args.board != found.name:
@@ -136,9 +140,12 @@ def workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help=dask)
 
 
-def output(parser: argparse.ArgumentParser, folder: str) -> None:
-    usual = f"Folder for the results (default: {folder})."
-    parser.add_argument("--output", metavar="DIR", default=folder, help=usual)
+def output(parser: argparse.ArgumentParser, text: str, metavar: str = "FILE", default: str | None = None) -> None:
+    parser.add_argument("-o", "--output", metavar=metavar, default=default, help=text)
+
+
+def output_folder(parser: argparse.ArgumentParser, default: str) -> None:
+    output(parser, f"Folder for the results (default: {default}).", "DIR", default)
 
 
 def known(option: str, names: list[str] | None, choices: list[str]) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError
@@ -11,6 +13,22 @@ from contactfpga.errors import ContactFPGAError
 
 class OutputError(ContactFPGAError):
     """A result could not be written."""
+
+
+_new: list[Path] = []
+"""Folders that this command made, innermost first."""
+
+
+@contextlib.contextmanager
+def no_empty_folders() -> Iterator[None]:
+    """Delete the folders that a command made and left empty, as when it is refused."""
+    _new.clear()
+    try:
+        yield
+    finally:
+        for place in _new:
+            with contextlib.suppress(OSError):
+                place.rmdir()
 
 
 def folder(path: str | Path, option: str = "--output") -> Path:
@@ -22,7 +40,9 @@ def folder(path: str | Path, option: str = "--output") -> Path:
 
 def _made(place: Path, asked: Path, option: str) -> None:
     try:
+        new = [one for one in (place, *place.parents) if not one.exists()]
         place.mkdir(parents=True, exist_ok=True)
+        _new[:0] = new
         with tempfile.TemporaryFile(dir=place):
             pass
     except FileExistsError:

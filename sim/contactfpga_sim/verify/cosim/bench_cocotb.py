@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -36,8 +37,14 @@ class SimulatorFailed(RuntimeError):
     """Build or run of a simulator failed; the message has the end of its output."""
 
 
+_SPLIT = re.compile(r"""[\s$"'`\\#:;&|<>()*?\[\]%=]""")
+"""What the makefiles of Verilator split or interpret in a path."""
+
+
 def available(simulator: str) -> bool:
-    """Whether ``verilator`` or ``icarus`` is available."""
+    """Whether ``verilator`` or ``icarus`` is available, Verilator in a path that its makefiles take."""
+    if simulator == "verilator" and _SPLIT.search(sysconfig.get_path("purelib")):
+        return False
     return all(shutil.which(command, path=_search_path()) for command in _COMMANDS[simulator])
 
 

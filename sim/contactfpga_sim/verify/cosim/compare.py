@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from contactfpga.errors import ContactFPGAError
 from contactfpga_sim.model.golden.trace import BOUNDARIES, Trace
 
 Event = tuple[Any, ...]
 
 
-class Mismatch(AssertionError):
+class Mismatch(ContactFPGAError, AssertionError):
     """The first difference between two traces.
 
     ``expected`` and ``got``: payloads at ``boundary`` in ``cycle``; None without one.
@@ -21,7 +22,7 @@ class Mismatch(AssertionError):
         self.expected = self._now(expected)
         self.got = self._now(got)
         super().__init__(
-            f"first difference at cycle {self.cycle}, boundary {boundary!r}: "
+            f"gateware and golden model differ: first difference at cycle {self.cycle}, boundary {boundary!r}: "
             f"expected {self._tell(expected)}, got {self._tell(got)}"
         )
 

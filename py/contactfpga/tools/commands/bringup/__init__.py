@@ -26,7 +26,7 @@ from contactfpga.driver.health import Finding
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError, SkinMismatch
 from contactfpga.inputs.files import write_text
-from contactfpga.inputs.values import number_in
+from contactfpga.inputs.values import number_in, shell_words
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
 from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
@@ -55,7 +55,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.kit(parser)
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
     parser.add_argument("--skin-output", metavar="FILE", help=own)
-    parser.add_argument("--output", metavar="FILE", help="The report (default: bringup-NAME-DATE.md).")
+    flags.output(parser, "The report (default: bringup-NAME-DATE.md).")
     long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
     wait = "Seconds to wait for the board (default: 1)."
@@ -107,15 +107,15 @@ def bring_up_skin(kit: Kit) -> Skin:
 
 def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
     path = outputs.file(name, "--skin-output")
-    text = kit.skin_path.read_text(encoding="utf-8")
+    text = kit.skin_path.read_text(encoding="utf-8-sig")
     tables = text[text.index("\n[") :] if "\n[" in text else ""
     write_text(
         path, f"# The {kit.name} kit's Skin for `contactfpga bringup`: it sends every cell.\n{skin.to_toml()}{tables}"
     )
     board = kit.board.name
     terminal.say(
-        f"{path} is written. Next: contactfpga build {board} --skin {path}, contactfpga flash {board}, then "
-        f"contactfpga bringup --kit {kit.name}",
+        f"{path} is written. Next: {shell_words('contactfpga', 'build', board, '--skin', path)}, "
+        f"contactfpga flash {board}, then contactfpga bringup --kit {kit.name}",
         hang=2,
     )
     return 0

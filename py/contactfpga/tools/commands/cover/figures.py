@@ -17,7 +17,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", metavar="CASE", help="Case to draw: a .toml file (default: the paper's).")
     data = "Forces in N and deformations in m; draw their line too."
     parser.add_argument("--data", metavar="FILE.csv", help=data)
-    flags.output(parser, "build/cover")
+    flags.output_folder(parser, "build/cover")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="Format (default: png).")
     parser.add_argument("--json", action="store_true", help="Print in JSON what was drawn.")
 

@@ -27,7 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=numbers.SECONDS, default=0.1, metavar="S", help=long)
     units = "The units (docs/haptics.md): refuse readings that are noisier than this file states."
     parser.add_argument("--units", metavar="FILE", help=units)
-    parser.add_argument("--output", metavar="FILE", help="Write the units with their new zeros to this TOML file.")
+    flags.output(parser, "Write the units with their new zeros to this TOML file.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -43,7 +43,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
     parser.add_argument("--force-threshold", action="store_true", help=force)
     flags.workers(parser)
-    flags.output(parser, "build/arm")
+    flags.output_folder(parser, "build/arm")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -29,7 +29,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     flags.workers(parser)
     parser.add_argument("--no-size", action="store_true", help="Leave out place and route.")
-    flags.output(parser, "build/chart")
+    flags.output_folder(parser, "build/chart")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,7 +19,7 @@ EXTRA = "sim"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
-    flags.output(parser, "build/failures")
+    flags.output_folder(parser, "build/failures")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     only = "Run nothing: use the results kept from earlier runs, as many as there are for each design."
     parser.add_argument("--kept", action="store_true", help=only)
     flags.workers(parser)
-    flags.output(parser, "build/flips")
+    flags.output_folder(parser, "build/flips")
 
 
 def run(args: argparse.Namespace) -> int:
