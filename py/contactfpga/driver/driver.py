@@ -44,8 +44,8 @@ def open(
     2
 
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB serial
-    number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast
-    as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
+    number, ``sim://`` (``?scene=NAME&skin=FILE``; ``pace=1``: in real time, otherwise only during reads),
+    ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
     (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the board), or None for the one
     supported board that is plugged in; with ``skin``, for the one with that Skin, or among several for the one with its
     name.
