@@ -45,10 +45,10 @@ def open(
 
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB serial
     number, ``sim://`` (``?scene=NAME&skin=FILE``; ``pace=1``: in real time, otherwise only during reads),
-    ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
-    (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the board), or None for the one
-    supported board that is plugged in; with ``skin``, for the one with that Skin, or among several for the one with its
-    name.
+    ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast as it is read), ``flexitac://DEVICE`` for a
+    foreign sheet, a virtual board (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the
+    board), or None for the one supported board that is plugged in; with ``skin``, for the one with that Skin, or among
+    several for the one with its name.
 
     ``skin``: the Skin (or its file) from which the board must be built; None accepts any board. ``baud``: bits per
     second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file for every received byte, to be read
