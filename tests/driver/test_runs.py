@@ -237,7 +237,7 @@ def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
 
 @pytest.mark.parametrize("take", [FrameQueue.pop, FrameQueue.pop_frames])
 def test_one_frame_is_not_both_shown_and_taken(take):
-    """The C reader's `latest()` shows a frame without the board's lock, right when another thread takes the next one."""
+    """The C reader's `latest()` shows a frame without the board's lock, as another thread takes the next one."""
     queue, drop, shown = FrameQueue(4), FrameQueue._drop_shown, []
     queue.put(Zones.__new__(Zones))
     thread = threading.Thread(target=lambda: shown.append(queue.show(1)))

@@ -12,7 +12,7 @@ from contactfpga.choices.choice import trusted
 from contactfpga.driver import forks, native, recording
 from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
-from contactfpga.driver.link import Link
+from contactfpga.driver.link import DROPPED, Link
 from contactfpga.driver.native_link import NativeLink, NativePort
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
@@ -165,10 +165,14 @@ def _forget(port: str | None, board: Board | None = None) -> None:
 
 
 def _given_back() -> bool:
+    """Whether boards were closed that nobody else uses."""
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)
-    return bool(kept)
+    dropped = [link for one in DROPPED.copy() if (link := one()) is not None]
+    for link in dropped:
+        link.close()
+    return bool(kept or dropped)
 
 
 @forks.in_child
