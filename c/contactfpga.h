@@ -541,7 +541,8 @@ static inline bool contactfpga__same_sheet(const contactfpga_hello *one, const c
         && one->report == other->report && one->fraction_bits == other->fraction_bits
         && one->zone_capacity == other->zone_capacity && one->pitch_x_mm == other->pitch_x_mm
         && one->pitch_y_mm == other->pitch_y_mm && one->plane == other->plane
-        && (one->plane || one->radius_mm == other->radius_mm) && one->ghosts == other->ghosts
+        && (one->plane || one->radius_mm == other->radius_mm) && one->closed == other->closed
+        && one->ghosts == other->ghosts
         && !memcmp(one->fingerprint, other->fingerprint, sizeof one->fingerprint);
 }
 

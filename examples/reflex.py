@@ -1,11 +1,12 @@
 """A control loop of 1 kHz that stops on contact, and when the skin says nothing: `python examples/reflex.py [PORT]`.
 
 Between two steps it waits for frames: a contact is acted on when its frame comes, not when the next step is due. "No
-data" is never "no contact": without a frame for SILENCE_S the loop stops, too.
+data" is never "no contact": without a frame for SILENCE_S the loop stops, too. It brakes whatever ends it.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from typing import NamedTuple
@@ -28,14 +29,27 @@ class Stop(NamedTuple):
 
     reason: str
     """`contact`, `fault` (a frame that may be wrong) or `silence`."""
-    decided_s: float
-    """When, on the board's clock."""
+    decided_s: float | None
+    """When, on the board's clock; None after an error."""
     zones: contactfpga.Zones | None
     """The frame that told it; None of silence."""
+    error: contactfpga.ContactFPGAError | None = None
+    """Why no frame can come any more: the board is gone, or has another bitstream."""
 
 
-def guard(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
-    """Call ``step`` every PERIOD_S until there is a reason to stop."""
+def guard(board: contactfpga.Board, step: Callable[[], None], brake: Callable[[], None]) -> Stop:
+    """Call ``step`` every PERIOD_S until there is a reason to stop, then ``brake`` at once: also after Ctrl-C and after
+    an error of ``step``, which is raised."""
+    try:
+        return watch(board, step)
+    except contactfpga.ContactFPGAError as error:
+        return Stop("silence", None, None, error)
+    finally:
+        brake()
+
+
+def watch(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
+    """Call ``step`` every PERIOD_S until a frame, or that none comes, is a reason to stop."""
     heard_s = due_s = board.clock()
     while True:
         step()
@@ -58,7 +72,8 @@ def why_stop(zones: contactfpga.Zones) -> str:
     """What a frame says against going on; "" where nothing does."""
     if "mismatch" in zones.flags or zones.faults:
         return "fault"
-    return "contact" if zones.pressed else ""
+    # With `motion`, a row read touched as the frame began: what touched it was gone before its cells were read.
+    return "contact" if zones.pressed or "motion" in zones.flags else ""
 
 
 def main() -> int:
@@ -69,14 +84,21 @@ def main() -> int:
         nonlocal steps
         steps += 1  # in its place: read the joints, command the motors
 
-    with contactfpga.open(sys.argv[1] if len(sys.argv) > 1 else None) as board:
-        stop = guard(board, step)
-    # Here the robot brakes.
+    def brake() -> None:
+        print("brake")  # in its place: brake the motors
+
+    try:
+        with contactfpga.open(sys.argv[1] if len(sys.argv) > 1 else None) as board:
+            stop = guard(board, step, brake)
+    except KeyboardInterrupt:
+        print(f"stopped after {steps} steps: Ctrl-C")
+        return 130
     print(f"stopped after {steps} steps: {stop.reason}")
-    if stop.zones:
-        print(stop.zones)
+    if stop.zones or stop.error:
+        print(stop.zones or stop.error)
     return 0
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # it brakes, too, and does not just end
     sys.exit(main())

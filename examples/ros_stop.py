@@ -40,7 +40,7 @@ class Stop(Node):
         """Take a frame."""
         self.heard_s = time.monotonic()
         fault = message.faults or message.flags & (Zones.FLAG_FAULT | Zones.FLAG_MISMATCH)
-        if not self.reason and (fault or message.pressed):
+        if not self.reason and (fault or message.pressed or message.flags & Zones.FLAG_MOTION):
             self.reason = "fault" if fault else "contact"
             self.get_logger().info(f"stop: {self.reason}")
             self.publish()

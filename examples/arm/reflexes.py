@@ -15,9 +15,9 @@ AXIS = np.array([0.0, 0.0, 1.0])
 
 
 def felt(snapshot):
-    """Return the contacts on the link, in its frame. Raise NoLinkData where the newest frame is old or has a fault."""
+    """Return the contacts on the link, in its frame. Raise NoLinkData where the newest frame is old or may be wrong."""
     state = snapshot.links[LINK]
-    if state.status != "ok" or state.age_s > SILENCE_S or "fault" in state.zones.flags:
+    if state.status != "ok" or state.age_s > SILENCE_S or {"fault", "mismatch"} & state.zones.flags:
         raise NoLinkData({LINK: state})
     return [one for one in snapshot.contacts("link", [LINK]) if one.point_m is not None]
 

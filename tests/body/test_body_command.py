@@ -25,6 +25,7 @@ UNITS = contactfpga.examples() / "units.toml"
         ('name = "chest"', 'name = "arm"', "two links are named 'arm'"),
         ('frame = "torso"', 'frame = "leg"', "link 'chest': frame is 'leg'; the URDF has no such link"),
         ('port = "b"', 'port = "a"', "links 'arm' and 'chest' have one port, 'a'"),
+        ('port = "b"', 'port = "sim://?pace=2"', "port is 'sim://?pace=2'; virtual boards of a robot run in real"),
         ("mirrored = true", "mirrored = 1", "link 'chest': mirrored is 1; it must be true or false"),
         ("mirrored = true", "mirored = true", "link 'chest': unknown key 'mirored'; did you mean 'mirrored'?"),
         ("mirrored = true", "late_s = 0.001", "link 'chest': late_s is 0.001; a board of this Skin may be silent for"),

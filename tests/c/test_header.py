@@ -14,7 +14,7 @@ from c_compilers import COMPILERS, FOLDER
 from frames import moments
 from model_board import ModelBoard
 from sample import sample
-from wire import digits, last_byte, old_frame, old_hello
+from wire import FINGERPRINT, SHEET, digits, last_byte, old_frame, old_hello
 
 from contactfpga import Skin
 from contactfpga.driver.conversation import Arrival, Conversation
@@ -340,6 +340,40 @@ def test_a_hello_that_cannot_be_is_refused_alike(decoder, field, value, taken):
     said = by_c(decoder, data)
     assert said == by_python(data)
     assert (said[0].split()[0] == "hello") == taken
+
+
+ROUND = Skin(rows=6, columns=7, surface="cylinder", radius_mm=9.0, closed=True)
+DIVIDED = Skin(report="barycenter", barycenter_bits=3)
+
+
+@pytest.mark.parametrize(
+    ("skin", "changed"),
+    [
+        (Skin(), {"rows": 15}),
+        (Skin(), {"columns": 15}),
+        (Skin(), {"connectivity": 4}),
+        (Skin(), {"report": "cells"}),
+        (DIVIDED, {"barycenter_bits": 4}),
+        (Skin(), {"zone_capacity": 9}),
+        (Skin(), {"pitch_x_mm": 9.0}),
+        (Skin(), {"pitch_y_mm": 9.0}),
+        (Skin(), {"surface": "cylinder", "radius_mm": 99.0}),
+        (ROUND, {"radius_mm": 8.0}),
+        (ROUND, {}),  # but that its ends do not meet, which no Skin of this pitch allows
+        (Skin(report="cells"), {"diodes": "none"}),
+    ],
+    ids=lambda value: ", ".join(value) or "closed" if isinstance(value, dict) else "sheet",
+)
+def test_a_sheet_that_is_another_by_one_field_is_a_change(decoder, skin, changed):
+    """Also where the fingerprint is that of before; times and counts then begin anew."""
+    wire = ModelBoard(skin).wire
+    other = ModelBoard(skin.replace(**changed)).wire.facts() | {FINGERPRINT: wire.known.fingerprint}
+    if not changed:
+        other[SHEET] = other[SHEET][:2] + bytes([skin.connectivity]) + other[SHEET][3:]
+    data = wire.hello(sent=100_000) + wire.hello(sent=5, facts=other)
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert " skin_changes=1 restarts=0 " in said[-1]
 
 
 def test_a_loss_of_more_than_32_bits_is_counted(decoder):

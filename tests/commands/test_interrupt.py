@@ -234,6 +234,35 @@ def test_the_signal_is_handled_as_before_when_a_command_is_done():
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.parametrize("number", interrupt.SIGNALS)
+def test_a_signal_that_numpy_drops_comes_again(number):
+    """While it looks whether a type is one of ctypes: else a command that runs until a signal would never end."""
+
+    class Kind(type):
+        @property
+        def __mro__(cls):
+            signal.raise_signal(number)
+
+    def body():
+        assert np.dtype(Kind("Any", (), {})) == object, "the signal is dropped"
+        time.sleep(SLACK_S)
+        pytest.fail("it goes on")
+
+    assert interrupt.guarded(body) == 128 + number
+
+
+def test_a_signal_is_not_repeated_while_the_command_cleans_up():
+    def body():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            time.sleep(10 * interrupt.AGAIN_S)
+            cleaned.append(True)
+
+    cleaned = []
+    assert (interrupt.guarded(body), cleaned) == (130, [True])
+
+
 def test_an_interrupt_says_what_was_kept(capsys):
     def body():
         raise interrupt.Interruption("interrupted; 3 of 7 are kept")

@@ -1,6 +1,7 @@
 """What `sim://` and `replay://` addresses mean, and what of foreign names a terminal gets to see."""
 
 import os
+import re
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from contactfpga_sim.model.board.pty_board import PtyBoard
         ("sim://?skin=50%25%26more%2B.toml", Sim(skin="50%&more+.toml")),
         ("sim://?skin=%C3%BC%20.toml", Sim(skin="ü .toml")),
         ("sim://?scene=a.npy&threshold=-1.5", Sim("a.npy", None, -1.5)),
+        ("sim://?pace=0.5", Sim(pace=0.5)),
     ],
 )
 def test_an_address_has_one_reading(address, meant):
@@ -43,6 +45,7 @@ def test_an_address_has_one_reading(address, meant):
         ("sim://?skin=", "skin is empty"),
         ("sim://board?skin=a", "it reads sim://"),
         ("sim://?scene=a.npy&threshold=nan", "threshold is 'nan'; it must be a finite number"),
+        ("sim://?pace=0", "pace is '0'; it must be a positive number up to 1e6, 1 for real time"),
     ],
 )
 def test_what_is_no_address_is_told(address, message):
@@ -62,6 +65,15 @@ def test_files_of_any_name_make_a_board(tmp_path):
     quoted = [str(path).replace("%", "%25").replace("&", "%26") for path in (skin, scene)]
     with contactfpga.open(f"sim://?skin={quoted[0]}&scene={quoted[1]}&threshold=8") as board:
         assert board.next().pressed == 1
+        assert board.skin == SLOW
+
+
+@pytest.mark.parametrize("option", ["skin", "scene", "units", "sheets"])
+def test_a_file_that_is_not_there_is_told(option):
+    address = f"sim://?{option}=nowhere.npy"
+    says = f"{address} cannot be opened: nowhere.npy: No such file or directory; is the path right?"
+    with pytest.raises(PortNotFound, match=f"^{re.escape(says)}$"):
+        contactfpga.open(address)
 
 
 @pytest.mark.parametrize("kind", ["fifo", "folder", "device"])

@@ -234,6 +234,7 @@ def test_a_board_tells_what_it_is():
         assert (opened.name, opened.clock_hz, opened.baud) == ("left arm", SKIN.clock_hz, SKIN.baud)
         with pytest.raises(contactfpga.ContactFPGAError, match=r"only `board.sheet` is known .*skin='my.toml'"):
             _ = opened.skin
+        assert not hasattr(opened, "skin")
 
 
 def test_the_reference_skin_is_known_by_its_fingerprint(board):

@@ -5,6 +5,7 @@ import contextlib
 import functools
 import itertools
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -59,6 +60,19 @@ def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
             opened.next(0.01)
         assert opened.clock() - before == pytest.approx(0.01)
         assert opened.next(0.1).time_us - answered.time_us == pytest.approx(100_000, abs=2 * 96)  # the keep-alive
+
+
+@pytest.mark.parametrize("pace", [1.0, 0.2])
+def test_a_paced_board_goes_on_while_nobody_reads_and_is_never_ahead(pace):
+    began_s = time.monotonic()
+    with contactfpga.open(f"sim://?scene=moving&pace={pace}") as opened:
+        before = opened.latest(LONG)
+        wait_until(lambda: opened.clock() > before.time_us / 1e6 + 0.03)
+        after = opened.latest(LONG)
+        assert after.time_us - before.time_us > 20_000
+        assert opened.read(LONG).time_us > after.time_us
+        assert opened.stats.lost == 0
+        assert opened.clock() <= pace * (time.monotonic() - began_s)
 
 
 @pytest.mark.slow

@@ -1,9 +1,11 @@
-"""The control loop of examples/reflex.py: it stops on contact, on silence and on a frame that may be wrong."""
+"""The control loop of examples/reflex.py: it stops on contact, on silence and on a frame that may be wrong, and brakes
+whatever ends it."""
 
+import asyncio
 import itertools
 
 import pytest
-from model_board import SCAN_US, DirectPort
+from model_board import SCAN_US, DirectPort, ModelBoard
 
 import contactfpga
 from contactfpga_sim.lab.tracking import reflex
@@ -15,9 +17,9 @@ LOOP = reflex.example()
 class SendingPort(DirectPort):
     """A port that sends a frame every scan, untouched until ``touch_s``, and nothing from ``silent_s`` on."""
 
-    def __init__(self, touch_s=float("inf"), silent_s=float("inf"), flags=()):
+    def __init__(self, touch_s=float("inf"), silent_s=float("inf"), flags=(), moments=((4, 10, 6),)):
         super().__init__(SKIN)
-        self.moments = []
+        self.moments, self.touch = [], list(moments)
         self.touch_s, self.silent_s, self.flags = touch_s, silent_s, flags
 
     def read(self, seconds):
@@ -29,15 +31,17 @@ class SendingPort(DirectPort):
             return b""
         self._seconds = max(self._seconds, due)
         if due >= self.touch_s:
-            self.moments = [(4, 10, 6)]
+            self.moments = self.touch
             return self.frame(flags=self.flags)
         return self.frame()
 
 
 def run(port):
-    steps = []
+    steps, braked = [], []
     with contactfpga.open(port, SKIN) as board:
-        return LOOP.guard(board, lambda: steps.append(board.clock())), steps, board
+        stop = LOOP.guard(board, lambda: steps.append(board.clock()), lambda: braked.append(board))
+    assert braked == [board]
+    return stop, steps, board
 
 
 def test_it_stops_within_a_scan_of_a_touch():
@@ -61,16 +65,51 @@ def test_silence_stops_it_like_a_contact():
     assert stop.decided_s - 0.03 == pytest.approx(LOOP.SILENCE_S, abs=2 * LOOP.PERIOD_S)
 
 
-@pytest.mark.parametrize("flag", ["mismatch", "fault"])
-def test_a_frame_that_may_be_wrong_stops_it(flag):
-    stop, _, _ = run(SendingPort(touch_s=0.01, flags=[flag]))
-    assert stop.reason == "fault"
+@pytest.mark.parametrize(("flag", "reason"), [("mismatch", "fault"), ("fault", "fault"), ("motion", "contact")])
+def test_a_frame_that_may_be_wrong_stops_it(flag, reason):
+    stop, _, _ = run(SendingPort(touch_s=0.01, flags=[flag], moments=[]))
+    assert stop.reason == reason
+
+
+class GonePort(SendingPort):
+    """A port that is pulled at 20 ms, or whose board then has another bitstream."""
+
+    def __init__(self, error):
+        super().__init__()
+        self.error = error
+
+    def read(self, seconds):
+        if self._seconds > 0.02 and self.error is contactfpga.PortLost:
+            raise contactfpga.PortLost("the port is gone")
+        if self._seconds > 0.02 and self.error:
+            self.error = None
+            self.send(ModelBoard(SKIN.replace(columns=8)).hello())
+        return super().read(seconds)
+
+
+@pytest.mark.parametrize("error", [contactfpga.PortLost, contactfpga.SkinMismatch])
+def test_a_board_that_is_gone_stops_it(error):
+    stop, steps, _ = run(GonePort(error))
+    assert (stop.reason, stop.zones, type(stop.error)) == ("silence", None, error)
+    assert len(steps) == pytest.approx(21, abs=1)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, asyncio.CancelledError])
+def test_it_brakes_however_it_is_left(error):
+    braked = []
+
+    def step():
+        raise error
+
+    with contactfpga.open(SendingPort(), SKIN) as board, pytest.raises(error):
+        LOOP.guard(board, step, lambda: braked.append(board))
+    assert len(braked) == 1
 
 
 def test_the_example_says_what_stopped_it(capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["reflex.py", "sim://"])
     assert LOOP.main() == 0
-    assert "steps: contact\n<Zones: 1 zone," in capsys.readouterr().out
+    assert "brake\nstopped after 1 steps: contact\n<Zones: 1 zone," in capsys.readouterr().out
 
 
 def test_the_measurement_counts_touches():

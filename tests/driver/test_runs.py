@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import random
+import threading
 
 import numpy as np
 import pytest
@@ -232,3 +233,21 @@ def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
                 plain = plain[-1:]
         assert (queue.first_error() is None) == (not plain or not isinstance(plain[0], Exception))
     assert times(iter(queue.pop, None)) == times(plain)
+
+
+@pytest.mark.parametrize("take", [FrameQueue.pop, FrameQueue.pop_frames])
+def test_one_frame_is_not_both_shown_and_taken(take):
+    """The C reader's `latest()` shows a frame without the board's lock, as another thread takes the next one."""
+    queue, drop, shown = FrameQueue(4), FrameQueue._drop_shown, []
+    queue.put(Zones.__new__(Zones))
+    thread = threading.Thread(target=lambda: shown.append(queue.show(1)))
+
+    def drop_and_pause():
+        drop(queue)
+        thread.start()
+        thread.join(0.2)  # in which it is shown, unless that has to wait
+
+    queue._drop_shown = drop_and_pause
+    assert take(queue) is not None
+    thread.join()
+    assert shown == [False]

@@ -70,6 +70,16 @@ def test_a_published_board_is_a_board(streaming, endpoint):
         assert publisher.end() == ""
 
 
+def test_a_virtual_board_is_published_until_the_first_signal(endpoint):
+    with publish("sim://", "--key", "try", "--listen", endpoint) as publisher:
+        with contactfpga.open(patient(publisher.line), timeout=LONG) as board:
+            wait_until(lambda: board.next(LONG).time_us > 300_000, LONG)
+            assert board.read(LONG).time_us > 300_000, "it answers"
+            assert board.stats.lost == 0
+        publisher.process.send_signal(signal.SIGINT)
+        assert publisher.process.wait(LONG) == 0
+
+
 def assert_given_back(pid, path):
     """Else a board that is plugged in again would get another name."""
     held = Path(f"/proc/{pid}/fd")

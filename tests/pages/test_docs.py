@@ -7,10 +7,14 @@ import io
 import re
 import runpy
 import shlex
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from sample import sample
+from terminals import environment, listening
 
 import contactfpga
 from contactfpga.tools import cli
@@ -92,6 +96,73 @@ def test_a_file_with_another_output_is_seen(tmp_path):
     file.write_text("import sys\nprint(sys.argv[1])\nsys.exit(0)")
     page.write_text(f"    $ python {file} one\n    one\n    $ python {file} one\n    two\n")
     assert examples_of(page) == doctest.TestResults(failed=1, attempted=2)
+
+
+LEFT_OUT = {
+    "flash": "it needs a board",
+    "doctor": "it needs a board",
+    "wire": "it needs a board",
+    "zones --skin": "it needs a board",
+    "zones name:": "it needs a board",
+    "zones PORT": "it needs a board",
+    "haptics zero": "it needs a board",
+    "haptics threshold": "it needs a board",
+    "ros /dev/": "it needs a board",
+    'view "flexitac:': "it needs a sheet; test_flexitac_ways.py",
+    "board --skin left.toml": "it writes into /tmp; test_virtual_board.py",
+    "build": "minutes of place and route; test_boards_build.py",
+    "bringup": "it asks a person, or takes minutes; test_bringup.py",
+    "study arm": "minutes to hours; test_arm.py",
+    "fit": "minutes; test_fit_command.py",
+    "latency": "minutes; test_latency.py",
+    "wave": "it compiles boards; test_wave.py",
+    "body examples/robot.toml": "it compiles four boards; test_body_command.py",
+    "view examples/": "it compiles boards, or needs an extra; test_view_body.py, test_mujoco_view.py",
+    "body surface": "it needs a mesh of the reader's; test_mesh.py",
+    "settle --skin FILE": "FILE is the reader's; test_settling.py",
+    "sheet examples/tiles.toml -o build/tiles --kicad": "it needs KiCad; test_sheet_kicad.py",
+    "publish --config": "it needs certificates; test_net_access.py",
+    "zones 'zenoh://left?config": "it needs certificates; test_net_access.py",
+}
+"""Commands of pages that no test runs as they are printed, by their first words, and why."""
+SHELL = re.compile(r"^    (?:\.venv/bin/)?contactfpga (.+?)(?: {2,}#.*)?$", re.MULTILINE)
+COMMANDS = {str(page.relative_to(ROOT)): SHELL.findall(page.read_text(encoding="utf-8")) for page in ALL_PAGES}
+RUN = {page: [one for one in commands if not one.startswith(tuple(LEFT_OUT))] for page, commands in COMMANDS.items()}
+UNTIL_CTRL_C = ("zones", "view", "ros", "publish")
+EARLIER = {"docs/view.md": ["record touches.mcap sim:// --seconds 0.1"]}
+"""What the reader of a page has done before."""
+PRINTED = [page for page, commands in RUN.items() if commands]
+
+
+def test_what_is_left_out_is_on_a_page():
+    printed = [one for commands in COMMANDS.values() for one in commands]
+    assert [left for left in LEFT_OUT if not any(one.startswith(left) for one in printed)] == []
+
+
+@pytest.mark.parametrize("page", sample(PRINTED, quick={"docs/net.md"}, slow=set(PRINTED)))
+def test_commands_without_output_run_as_printed(page, tmp_path):
+    """One after the other; what runs until Ctrl-C does so until the page's end, and shows something."""
+    for package in ("mcap", "viser", "zenoh", "cyclonedds"):
+        pytest.importorskip(package)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "my.toml").write_text(contactfpga.Skin(release_us=17.0).to_toml())
+    variables = environment(BROWSER="true", XDG_RUNTIME_DIR=".")  # no window, and a socket of its own
+    running = {}
+    for command in EARLIER.get(page, []) + RUN[page]:
+        words = [sys.executable, "-m", "contactfpga", *shlex.split(command)]
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "cwd": tmp_path, "preexec_fn": listening}
+        running[command] = subprocess.Popen(words, **options, env=variables)
+        if command.startswith(UNTIL_CTRL_C):
+            assert running[command].stdout.read1()
+        else:
+            process = running.pop(command)
+            said, _ = process.communicate(timeout=600)
+            assert process.returncode == 0, said
+    for command, process in reversed(running.items()):
+        assert process.poll() is None, command
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        assert process.returncode == 0, command
 
 
 def documented(page: str) -> set[str]:

@@ -44,7 +44,7 @@ def node(monkeypatch):
     sys.modules["rclpy.node"].Node = Node
     sys.modules["rclpy.qos"].QoSProfile = SimpleNamespace
     sys.modules["rclpy.qos"].ReliabilityPolicy = SimpleNamespace(BEST_EFFORT=2)
-    sys.modules["contactfpga_msgs.msg"].Zones = SimpleNamespace(FLAG_FAULT=4, FLAG_MISMATCH=2)
+    sys.modules["contactfpga_msgs.msg"].Zones = SimpleNamespace(FLAG_FAULT=4, FLAG_MISMATCH=2, FLAG_MOTION=8)
     sys.modules["std_msgs.msg"].Bool = SimpleNamespace
     made = runpy.run_path(str(contactfpga.examples() / "ros_stop.py"))["Stop"]
     node = made()
@@ -66,7 +66,9 @@ def test_it_says_stop_until_a_frame_comes(node):
     assert heard(node) is False
 
 
-@pytest.mark.parametrize("values", [{"pressed": 1}, {"flags": 4}, {"flags": 2}, {"faults": ["row 3 open"]}], ids=str)
+@pytest.mark.parametrize(
+    "values", [{"pressed": 1}, {"flags": 2}, {"flags": 4}, {"flags": 8}, {"faults": ["row"]}], ids=str
+)
 def test_a_contact_and_a_fault_stop_at_once_and_for_good(node, values):
     assert heard(node) is False
     node.take(SimpleNamespace(**CLEAN | values))
@@ -75,7 +77,7 @@ def test_a_contact_and_a_fault_stop_at_once_and_for_good(node, values):
 
 
 def test_flags_that_say_nothing_against_going_on_do_not_stop(node):
-    assert heard(node, flags=1 | 8 | 16) is False
+    assert heard(node, flags=1 | 16) is False
 
 
 def test_silence_stops_it_until_frames_come_again(node):

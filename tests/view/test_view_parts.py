@@ -296,6 +296,7 @@ def test_silence_is_said(board):
         ("replay://a.bin", {"units": "units.toml"}, "--units is for a board; replay://a.bin is a recording"),
         ("sim://", {"link": "arm"}, "--link is for a recording; sim:// is not one"),
         (None, {"link": "arm"}, "--link is for a recording; name one"),
+        ("sim://?pace=2", {}, "sim://?pace=2: the view shows a virtual board in real time; leave out pace"),
     ],
 )
 def test_what_would_be_left_out_is_refused(port, given, says):

@@ -6,6 +6,7 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tty
 from pathlib import Path
@@ -190,6 +191,26 @@ def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
     assert process.returncode == 0, err
     assert re.search(r"ended: the board ran for \d+\.\d s in \d+\.\d s of real time \(\d+%\)\n", err)
     assert not link.is_symlink()
+
+
+def test_signals_within_the_handler_of_another_end_it_too():
+    """One comes at each line of the handler, with all that it calls."""
+    board = PtyBoard(SLOW)
+
+    def again(*_):
+        sys.settrace(None)
+        handler()
+        sys.settrace(again)
+        return again
+
+    with board._ended_by_signals():
+        handler = signal.getsignal(signal.SIGTERM)
+        thread = threading.Thread(target=lambda: (sys.settrace(again), handler()), daemon=True)
+        thread.start()
+        thread.join(60)
+    assert not thread.is_alive()
+    board._run()  # which ends at once
+    board.stop()
 
 
 def test_a_link_that_cannot_be_made_is_an_error(tmp_path):

@@ -32,7 +32,7 @@ class Serial:
 
 @dataclasses.dataclass(frozen=True)
 class Sim:
-    """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE&sheets=FILE``, decoded."""
+    """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE&sheets=FILE&pace=NUMBER``, decoded."""
 
     scene: str | None = None
     skin: str | None = None
@@ -41,6 +41,8 @@ class Sim:
     units: str | None = None
     """File of pressure units, pressed by the scene."""
     sheets: str | None = None
+    pace: float | None = None
+    """Speed relative to real time; None: time passes only during reads."""
 
     @classmethod
     def parse(cls, name: str) -> Sim:
@@ -62,6 +64,7 @@ class Sim:
                 raise AddressError(f"{name}: {key} is empty; {_SIM_FORM}")
         if "threshold" in found:
             found["threshold"] = _threshold(name, found["threshold"])
+        found["pace"] = _pace(name, found.get("pace"), "real time")
         if "sheets" in found and (other := {"skin", "threshold", "units"} & set(found)):
             raise AddressError(
                 f"{name}: with sheets there is no {min(other)}; their Skins are in the file of the sheets"
@@ -70,7 +73,7 @@ class Sim:
 
 
 SIM_OPTIONS = tuple(field.name for field in dataclasses.fields(Sim))
-_SIM_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER and &units=FILE where wanted"
+_SIM_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER, &units=FILE and &pace=1 where wanted"
 _ESCAPES = "a % that is meant is written %25, a & %26"
 
 
@@ -112,13 +115,13 @@ class Replay:
             if key in found:
                 raise AddressError(f"{name}: {key} is given twice")
             found[key] = value
-        pace = _number(name, "pace", found.get("pace"), "a positive number, 1 for the time of the recording")
-        start = _number(name, "start", found.get("start"), "a number of seconds, 0 or more")
-        if pace == 0:
-            raise AddressError(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
+        pace = _pace(name, found.get("pace"), "the time of the recording")
+        start = number_in(found.get("start", "0"))
+        if not 0 <= start < math.inf:
+            raise AddressError(f"{name}: start is {found['start']!r}; it must be a number of seconds, 0 or more")
         link = unquote(found["link"]) if "link" in found else None
         try:
-            return cls(Path(path).expanduser(), pace, start or 0.0, link)
+            return cls(Path(path).expanduser(), pace, start, link)
         except RuntimeError as error:  # ~nobody
             raise AddressError(f"{name} cannot be opened: {error}") from None
 
@@ -128,12 +131,12 @@ _REPLAY_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
 REPLAY_FORM = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
-def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
+def _pace(name: str, text: str | None, what: str) -> float | None:
     if text is None:
         return None
     value = number_in(text)
-    if not 0 <= value < math.inf:
-        raise AddressError(f"{name}: {key} is {text!r}; it must be {wanted}")
+    if not 1e-6 <= value <= 1e6:
+        raise AddressError(f"{name}: pace is {text!r}; it must be a positive number up to 1e6, 1 for {what}")
     return value
 
 

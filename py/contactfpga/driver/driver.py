@@ -12,7 +12,7 @@ from contactfpga.choices.choice import trusted
 from contactfpga.driver import forks, native, recording
 from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board, Opening
-from contactfpga.driver.link import Link
+from contactfpga.driver.link import DROPPED, Link
 from contactfpga.driver.native_link import NativeLink, NativePort
 from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
@@ -44,11 +44,11 @@ def open(
     2
 
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB serial
-    number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast
-    as it is read), ``flexitac://DEVICE`` for a foreign sheet, a virtual board
-    (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the board), or None for the one
-    supported board that is plugged in; with ``skin``, for the one with that Skin, or among several for the one with its
-    name.
+    number, ``sim://`` (``?scene=NAME&skin=FILE``; ``pace=1``: in real time, otherwise only during reads),
+    ``replay://FILE`` (``?pace=1``: in its own time, otherwise as fast as it is read), ``flexitac://DEVICE`` for a
+    foreign sheet, a virtual board (:class:`~contactfpga_sim.model.board.virtual.VirtualBoard`, which is closed with the
+    board), or None for the one supported board that is plugged in; with ``skin``, for the one with that Skin, or among
+    several for the one with its name.
 
     ``skin``: the Skin (or its file) from which the board must be built; None accepts any board. ``baud``: bits per
     second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file for every received byte, to be read
@@ -165,10 +165,14 @@ def _forget(port: str | None, board: Board | None = None) -> None:
 
 
 def _given_back() -> bool:
+    """Whether boards were closed that nobody else uses."""
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)
-    return bool(kept)
+    dropped = [link for one in DROPPED.copy() if (link := one()) is not None]
+    for link in dropped:
+        link.close()
+    return bool(kept or dropped)
 
 
 @forks.in_child

@@ -9,12 +9,17 @@ from contactfpga.driver.events import Silence, checked_deadline
 from contactfpga.driver.link import Link
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription
+from contactfpga.driver.transport import skins_of
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.units import UnitHistory
+
+
+class UnknownSkin(ContactFPGAError, AttributeError):
+    """Of the board's Skin only the sheet is known."""
 
 
 class BoardFacts:
@@ -79,15 +84,17 @@ class BoardFacts:
 
     @property
     def skin(self) -> Skin:
-        """The board's whole Skin: the one given to :func:`open`, or the reference Skin by its fingerprint.
+        """The board's whole Skin: the one given to :func:`open`, a virtual board's own, or the reference Skin by its
+        fingerprint.
 
-        Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
+        Raises :class:`ContactFPGAError` (also an AttributeError, for ``hasattr``) for any other board, whose hello
+        describes only the :attr:`sheet`.
         """
         hello = self.hello
-        for skin in (self._expected, Skin()):
+        for skin in (self._expected, *skins_of(self._link.transport), Skin()):
             if skin is not None and skin.fingerprint == hello.fingerprint:
                 return skin
-        raise ContactFPGAError(
+        raise UnknownSkin(
             f"{self.port}: of this board's Skin only `board.sheet` is known (fingerprint {hello.fingerprint.hex()}); "
             "give its file: open(port, skin='my.toml')"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import threading
 
 from contactfpga.driver.events import SideEvent
 from contactfpga.errors import ContactFPGAError
@@ -24,6 +25,7 @@ class FrameQueue:
         self.others = 0
         """Number of waiting items that are no frames."""
         self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
+        self._giving = threading.Lock()  # lest one frame be shown and popped
         self._taken = 0  # frames of the run in front
         self._came = self._gone = came  # frames, which have numbers from 1; those that wait no more
 
@@ -36,13 +38,14 @@ class FrameQueue:
         return max(self._gone, self.shown)
 
     def show(self, number: int) -> bool:
-        """Mark a frame as given to the listener outside of the queue; False if it already had it. All callers hold a
-        common lock, not necessarily the board's.
+        """Mark a frame as given to the listener outside of the queue; False if it already had it. The caller need not
+        hold the board's lock.
         """
-        if number <= self.seen:
-            return False
-        self.shown = number
-        return True
+        with self._giving:
+            if number <= self.seen:
+                return False
+            self.shown = number
+            return True
 
     def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
         self._items.append(item)
@@ -61,6 +64,10 @@ class FrameQueue:
 
     def pop(self) -> Zones | SideEvent | ContactFPGAError | None:
         """The next item; None if nothing waits."""
+        with self._giving:
+            return self._popped()
+
+    def _popped(self) -> Zones | SideEvent | ContactFPGAError | None:
         self._drop_shown()
         if not self._items:
             return None
@@ -82,13 +89,14 @@ class FrameQueue:
 
     def pop_frames(self) -> list[Zones | Run]:
         """All waiting frames up to the first error."""
-        self._drop_shown()
-        self._unwrap()
         found: list[Zones | Run] = []
-        while self._items and isinstance(item := self._items[0], (Zones, Run)):
-            found.append(item)
-            self._items.popleft()
-            self._gone += _count(item)
+        with self._giving:
+            self._drop_shown()
+            self._unwrap()
+            while self._items and isinstance(item := self._items[0], (Zones, Run)):
+                found.append(item)
+                self._items.popleft()
+                self._gone += _count(item)
         return found
 
     def first_error(self) -> ContactFPGAError | None:

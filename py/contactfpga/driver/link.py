@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import logging
 import math
@@ -176,6 +177,7 @@ class Link:
     def abandon(self) -> None:
         """Make the reader close a port without possible listeners. Takes no lock."""
         self._closing = True
+        DROPPED.append(weakref.ref(self))
 
     def close(self) -> None:
         """Close the port; may be called twice."""
@@ -376,6 +378,10 @@ class Link:
                     return
             with contextlib.suppress(ContactFPGAError):  # the next read says so
                 self._send()
+
+
+DROPPED: collections.deque[weakref.ref[Link]] = collections.deque(maxlen=64)
+"""Links whose boards were dropped without being closed; while they live, their ports may be open."""
 
 
 def check_command(name: str, hello: Hello | None, command: Command) -> None:

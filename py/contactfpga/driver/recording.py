@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import re
 import stat
@@ -15,7 +14,8 @@ from contactfpga.driver import forks
 from contactfpga.driver.address import REPLAY_FORM, Replay
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap import MAGIC, McapStream, files_of
-from contactfpga.driver.transport import Transport, counters_of
+from contactfpga.driver.pace import Pace
+from contactfpga.driver.transport import Transport, counters_of, skins_of
 from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.skin.derived import LONGEST_PACKET
@@ -86,7 +86,7 @@ class RecordingTransport:
         self._transport = transport
         self.name = transport.name
         self.live, self.threaded = transport.live, transport.threaded
-        self.counters = counters_of(transport)
+        self.counters, self.skins = counters_of(transport), skins_of(transport)
         self.write = transport.write
         self.clock = transport.clock
         self.take = tap.take
@@ -168,12 +168,12 @@ class ReplayTransport:
     def __init__(self, name: str):
         self.name = name
         pace = Replay.parse(name).pace
-        self._pace = None if pace is None else _Pace(name, pace)
+        self._paced = None if pace is None else _PacedPackets(name, pace)
         self._file = open_recorded(name)
 
     def read(self, timeout_s: float) -> bytes:
-        if self._pace is not None:
-            return self._pace.read(self._file, timeout_s)
+        if self._paced is not None:
+            return self._paced.read(self._file, timeout_s)
         return _more(self._file, 4096, self.name)
 
     def write(self, data: bytes) -> None:
@@ -181,21 +181,20 @@ class ReplayTransport:
 
     def clock(self) -> float:
         # A recording has no times of its own, and nothing in it is waited for unless it is paced.
-        return 0.0 if self._pace is None else time.monotonic()
+        return 0.0 if self._paced is None else time.monotonic()
 
     def close(self) -> None:
         self._file.close()
 
 
-class _Pace:
+class _PacedPackets:
     def __init__(self, name: str, factor: float):
         self._name = name
         self._factor = factor
         self._conversation = Conversation(name, live=False)
         self._held = b""
-        self._due_s = -math.inf
-        self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
-        self._last_us = 0
+        self._pace: Pace | None = None  # before the first frame
+        self._last_s = 0.0
 
     def read(self, file: ByteFile, timeout_s: float) -> bytes:
         if not self._held:
@@ -205,8 +204,8 @@ class _Pace:
             self._held = bytes(packet)
             for event in self._conversation.receive(self._held, 0.0):
                 if isinstance(event, Arrival):
-                    self._schedule(event.zones.time_us)
-        wait_s = self._due_s - time.monotonic()
+                    self._schedule(event.zones.time_us / 1e6)
+        wait_s = 0.0 if self._pace is None else self._pace.wait_s(self._last_s)
         if wait_s > 0:
             time.sleep(min(wait_s, max(0.0, timeout_s)))
         if wait_s > timeout_s:
@@ -214,12 +213,10 @@ class _Pace:
         data, self._held = self._held, b""
         return data
 
-    def _schedule(self, time_us: int) -> None:
-        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins again
-            self._begun = time.monotonic(), time_us
-        moment_s, begun_us = self._begun
-        self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor
-        self._last_us = time_us
+    def _schedule(self, at_s: float) -> None:
+        if self._pace is None or at_s < self._last_s:  # a board that was restarted begins again
+            self._pace = Pace(at_s, self._factor)
+        self._last_s = at_s
 
 
 def _more(file: ByteFile, count: int, name: str) -> bytes:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contactfpga.driver import forks
 from contactfpga.driver.address import SheetOf
 from contactfpga.driver.conversation import Conversation
-from contactfpga.driver.transport import Transport, connect
+from contactfpga.driver.transport import Transport, connect, skins_of
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire import framing
@@ -148,7 +148,7 @@ class SheetPort:
     def __init__(self, name: str, number: int, shared: SharedPort):
         self.name, self.number = name, number
         self.live, self.threaded = shared.inner.live, shared.inner.threaded
-        self.clock = shared.inner.clock
+        self.clock, self.skins = shared.inner.clock, skins_of(shared.inner)
         self._shared = shared
         shared.add(self)
 

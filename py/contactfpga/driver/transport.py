@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import os
 import random
@@ -14,8 +15,10 @@ from typing import Any, Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import Flexitac, Net, Replay, Serial, SheetOf, Sim, parse
+from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
+from contactfpga.inputs.files import told
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin
 
@@ -33,6 +36,11 @@ address, or for ``sim`` a :class:`SimulatedPort`.
 OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
 
 CHUNK = 65_536
+
+STEP_S, MOMENT_S = 0.5e-3, 2e-3
+"""Of a paced virtual board: real time between looks at the clock, most simulated time of a read."""
+LAG_S = 0.1
+"""Largest lag of a paced virtual board that is caught up."""
 
 
 class Transport(Protocol):
@@ -171,6 +179,8 @@ class SimTransport:
         self.name = name
         self.rng: random.Random | None = getattr(board, "rng", None)
         """The board's random generator of request numbers: equal runs give equal bytes."""
+        self.skins: tuple[Skin, ...] = getattr(board, "skins", ())
+        """The Skins from which the board was built."""
         self._board = board
         if _SIMULATED.setdefault(id(board), self) is not self:
             raise PortBusy(f"{name} is in use: this program opened it already; close that first")
@@ -191,6 +201,33 @@ class SimTransport:
         self._board.close()
 
 
+class PacedTransport(SimTransport):
+    """A virtual board whose time passes by itself, ``pace`` seconds in one second, or slower on a slow computer; its
+    times stay those of the simulation. The board is thread-safe.
+    """
+
+    threaded = True
+
+    def __init__(self, name: str, board: SimulatedPort, pace: float):
+        super().__init__(name, board)
+        self._pace = Pace(self.clock(), pace, LAG_S)
+
+    def read(self, timeout_s: float) -> bytes:
+        """All bytes that are due, of at most :data:`MOMENT_S`, after at most ``timeout_s`` of real or simulated
+        time.
+        """
+        begun, begun_s, data = self.clock(), time.monotonic(), b""
+        while True:
+            passed = self.clock() - begun
+            ends = bool(data) or max(passed, time.monotonic() - begun_s) >= timeout_s
+            if (due := self._pace.due(self.clock())) > 0 and not (ends and passed >= MOMENT_S):
+                data += super().read(min(due, MOMENT_S))
+            elif ends:
+                return data
+            else:
+                time.sleep(STEP_S)
+
+
 _SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDictionary()
 """Open transports by board, since two readers would take each other's bytes."""
 
@@ -201,8 +238,13 @@ def counters_of(transport: Transport) -> NetCounters | None:
     return getattr(transport, "counters", None)
 
 
-def connect(name: str | SimulatedPort, baud: int) -> Transport:
-    """Open the transport for a port name or a virtual board."""
+def skins_of(transport: Transport) -> tuple[Skin, ...]:
+    """The Skins of a virtual board's sheets."""
+    return getattr(transport, "skins", ())
+
+
+def connect(name: str | SimulatedPort, baud: int, pace: float | None = None) -> Transport:
+    """Open the transport for a port name or a virtual board. pace: of a ``sim://`` address that names none."""
     if not isinstance(name, str):
         if not hasattr(name, "read"):
             raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
@@ -211,17 +253,23 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     if isinstance(address, Serial):
         return SerialTransport(name, baud)
     if isinstance(address, Sim):
-        return SimTransport(name, virtual_board(name))
+        pace = address.pace or pace
+        board = virtual_board(name)
+        return SimTransport(name, board) if pace is None else PacedTransport(name, board, pace)
     if isinstance(address, SheetOf):
-        transport: Transport = _opener("sheet")(address, baud)
+        transport: Transport = _opener("sheet")(address, baud, functools.partial(connect, pace=pace))
     else:
         transport = _opener(OPENED_BY_NAME[type(address)])(name)
     return transport
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board of ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default."""
-    board: SimulatedPort = _opener("sim")(name, skin)
+    """The board of a ``sim://`` address; ``skin``: default. Raises :class:`PortNotFound` without one of its files."""
+    opener = _opener("sim")
+    try:
+        board: SimulatedPort = opener(name, skin)
+    except OSError as error:
+        raise PortNotFound(f"{name} cannot be opened: {told(error)}; is the path right?") from None
     return board
 
 

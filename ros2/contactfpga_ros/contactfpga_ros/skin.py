@@ -157,14 +157,14 @@ class Skin(Node):
 def main() -> None:
     """Run the node until it is told to end."""
     # With rclpy's own handlers nothing could be published any more while the thread of the board still does.
-    ended = threading.Event()
+    ended: list[int] = []  # and no Event, whose lock the handler of a second signal would wait for
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Skin()
     if node.get_parameter("autostart").value and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
         node.trigger_activate()
-    while not ended.is_set():
+    while not ended:
         rclpy.spin_once(node, timeout_sec=0.2)
     node.close()
     node.destroy_node()

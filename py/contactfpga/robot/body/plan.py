@@ -153,8 +153,13 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     if "port" not in values:
         return None
     port = text(values, "port")
-    if port.startswith("sim:") and SheetOf.parse(port) is None and Sim.parse(port).skin is None:
-        return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
+    if port.startswith("sim:"):
+        sheet = SheetOf.parse(port)
+        address = Sim.parse(port if sheet is None else sheet.port)
+        if address.pace is not None:
+            raise BodyError(f"port is {shown(port)}; virtual boards of a robot run in real time; leave out pace")
+        if sheet is None and address.skin is None:
+            return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
     return port
 
 

@@ -12,6 +12,7 @@ from typing import Protocol
 from contactfpga.driver import driver
 from contactfpga.driver.address import searched
 from contactfpga.driver.board import Board
+from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import BoardClosed, BoardSilent, OnlyNoise, ReadTimeout, SkinMismatch, VersionMismatch
 from contactfpga.inputs.values import shown
@@ -84,16 +85,15 @@ class SharedClock:
     """Gives boards simulated time at the rate of real time, and in step. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float]):
-        self._clock = clock
         self._lock = threading.Lock()
-        self._began_s = clock()
+        self._pace = Pace(0.0, most_lag_s=LAG_S, clock=clock)
         self._joined_s: dict[str, float] = {}  # by link, what to add to a board's clock for the common one
         self._now_s: dict[str, float] = {}  # on the common clock, of each board
 
     def join(self, link: str, board_s: float) -> None:
         """Add a board whose own clock reads ``board_s``; it starts at the others' time."""
         with self._lock:
-            now_s = min(self._now_s.values(), default=self._clock() - self._began_s)
+            now_s = min(self._now_s.values(), default=self._pace.due(0.0))
             self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
 
     def leave(self, link: str) -> None:
@@ -106,12 +106,7 @@ class SharedClock:
         with self._lock:
             mine_s = self._now_s[link] = self._joined_s[link] + board_s
             last_s = min(self._now_s.values())
-            real_s = self._clock() - self._began_s
-            lag_s = real_s - last_s - LAG_S
-            if lag_s > 0:
-                self._began_s += lag_s
-                real_s -= lag_s
-            return min(real_s, last_s + STEP_S) - mine_s
+            return last_s + min(self._pace.due(last_s), STEP_S) - mine_s
 
 
 NO_TRACKS = Tracks(0, (), ())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import collections
 import contextlib
 import random
 import threading
@@ -21,18 +20,14 @@ if TYPE_CHECKING:
 
 SLICE_S = 0.01
 """Longest interval of reading a port while bytes are collected, lest it overflow."""
-SIMULATED_S = 0.002
-"""Most simulated time that passes at once."""
 
 
 class BoardPort(Protocol):
-    threaded: bool
+    """A port whose bytes come by themselves: a :class:`~contactfpga.driver.transport.Transport` that is threaded."""
 
     def read(self, timeout_s: float) -> bytes: ...
 
     def write(self, data: bytes) -> None: ...
-
-    def clock(self) -> float: ...
 
 
 class BoardPublisher:
@@ -61,8 +56,6 @@ class BoardPublisher:
         self._source, self._batch_s, self._commands, self._clock = source, batch_s, commands, clock
         self._number = random.SystemRandom().getrandbits(64)
         self._offset = 0
-        self._begun_s = time.monotonic() - source.clock()
-        self._asked: collections.deque[bytes] = collections.deque(maxlen=64)
         _check_alone(session, key)
         control = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
         self._out = session.declare_publisher(f"{key}/bytes", congestion_control=control, express=True)
@@ -80,18 +73,13 @@ class BoardPublisher:
             self._out.undeclare()
 
     def step(self) -> None:
-        data = self._read(BEAT_S)
+        data = self._source.read(BEAT_S)
         read_us = round(self._clock() * 1e6)
         if data and self._batch_s:
-            if self._source.threaded:
-                until_s = time.monotonic() + self._batch_s
-                while (left_s := until_s - time.monotonic()) > 0:
-                    time.sleep(min(left_s, SLICE_S))
-                    data += self._read(0.0)
-            else:
-                until = self._source.clock() + self._batch_s
-                while (left := until - self._source.clock()) > 0 and len(data) < MOST_BYTES:
-                    data += self._read(left)
+            until_s = time.monotonic() + self._batch_s
+            while (left_s := until_s - time.monotonic()) > 0:
+                time.sleep(min(left_s, SLICE_S))
+                data += self._source.read(0.0)
         for start in range(0, max(1, len(data)), MOST_BYTES):
             self._send(data[start : start + MOST_BYTES], read_us)
 
@@ -101,18 +89,6 @@ class BoardPublisher:
         self._offset += len(data)
         self._out.put(message.encode())
 
-    def _read(self, timeout_s: float) -> bytes:
-        if self._source.threaded:
-            return self._source.read(timeout_s)
-        # A simulated board is held to the time that passes; one that is slower still sends its beat in time.
-        data, until, until_s = b"", self._source.clock() + timeout_s, time.monotonic() + timeout_s
-        while not data and (left := until - self._source.clock()) > 0 and time.monotonic() <= until_s:
-            while self._asked:
-                self._source.write(self._asked.popleft())
-            data = self._source.read(min(left, SIMULATED_S))
-            time.sleep(max(0.0, self._begun_s + self._source.clock() - time.monotonic()))
-        return data
-
     def _take(self, sample: zenoh.Sample) -> None:
         data = sample.payload.to_bytes()
         asked = request_kind(data) if len(data) <= MOST_ASKED else RequestKind.OTHER
@@ -120,11 +96,8 @@ class BoardPublisher:
             self.denied += 1
             return
         self.passed += 1
-        if self._source.threaded:
-            with contextlib.suppress(ContactFPGAError):  # the next read says so, or who asks asks again
-                self._source.write(data)
-        else:
-            self._asked.append(data)
+        with contextlib.suppress(ContactFPGAError):  # the next read says so, or who asks asks again
+            self._source.write(data)
 
 
 def _check_alone(session: zenoh.Session, key: str) -> None:

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         network = ending.enter_context(open_session(here, args.config))
         publishers: dict[BoardPublisher, Transport] = {}
         for of, (device, baud) in boards.items():
-            transport = connect(device, baud)
+            transport = connect(device, baud, pace=1.0)
             ending.callback(transport.close)
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
             publishers[BoardPublisher(transport, network, of, **options)] = transport

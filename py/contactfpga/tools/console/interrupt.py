@@ -13,9 +13,10 @@ import os
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
@@ -26,10 +27,12 @@ from contactfpga.tools.console import signals
 from contactfpga.tools.console.signals import SIGNALS
 
 AGAIN_S = 0.01
-"""Delay of repeating a signal that Python dropped, as in a destructor."""
+"""Delay of repeating a signal that was dropped."""
 
 _came: int | None = None
 """The signal since the command began, unless it was the normal end."""
+_runs = False
+"""Whether a command runs that a signal should end."""
 
 
 class Interruption(KeyboardInterrupt):
@@ -42,8 +45,8 @@ def guarded(body: Callable[[], int | None]) -> int:
     Shells start background processes with Ctrl-C ignored, but the same signal ends them; this function handles it
     anyway.
     """
-    global _came
-    _came = None
+    global _came, _runs
+    _came, _runs = None, True
     terminal.prepare()
     try:
         with _listening():
@@ -51,6 +54,7 @@ def guarded(body: Callable[[], int | None]) -> int:
     except KeyboardInterrupt:  # it came while listening began or ended
         return _cut_short()
     finally:
+        _runs = False
         # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by
         # SIGINT, whatever the status, unless another text is run to its end.
         exec("")
@@ -93,6 +97,8 @@ def _status(body: Callable[[], int | None]) -> int:
 
 
 def _cut_short(said: str = "") -> int:
+    global _runs
+    _runs = False
     number = signal.SIGINT if _came is None else _came
     if threading.current_thread() is threading.main_thread():
         signals.end_all_at_once()  # should it be told twice
@@ -133,7 +139,7 @@ def _listening() -> Iterator[None]:
         yield  # signals are the main thread's
         return
     before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
-    hook, sys.unraisablehook = sys.unraisablehook, _again
+    hook, sys.unraisablehook = sys.unraisablehook, _unreported
     try:
         yield
     finally:
@@ -146,17 +152,36 @@ def _interrupt(number: int, _: object) -> None:
     global _came
     _came = number
     silence_amaranth()  # before anything is left half made
+    # No object of `threading`, whose locks the interrupted code may hold.
+    _thread.start_new_thread(_repeat, (number,))
     raise KeyboardInterrupt
 
 
-def _again(what: sys.UnraisableHookArgs) -> None:
-    """Repeat a signal in an unraisable error, instead of Python's report."""
+def _repeat(number: int) -> None:
+    """Send a signal again if the command goes on: destructors drop its exception, and so do libraries in C, as numpy
+    does while it looks at a type.
+    """
+    time.sleep(AGAIN_S)
+    while _runs and _came is not None:
+        if not _ending():
+            _send(number)  # which starts another thread like this one
+            return
+        time.sleep(AGAIN_S)
+
+
+def _ending() -> bool:
+    """Whether the main thread handles the exception of a signal, as while it cleans up."""
+    handled: Any = sys._current_exceptions().get(threading.main_thread().ident or 0)
+    error = handled[1] if isinstance(handled, tuple) else handled  # a tuple before Python 3.12
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
+
+
+def _unreported(what: sys.UnraisableHookArgs) -> None:
+    """Python's report of an error that cannot be raised, unless it is a signal, which is repeated."""
     if _came is None or not issubclass(what.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(what)
-        return
-    timer = threading.Timer(AGAIN_S, _send, (_came,))
-    timer.daemon = True
-    timer.start()
 
 
 def _send(number: int) -> None:

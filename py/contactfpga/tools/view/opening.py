@@ -188,6 +188,8 @@ def _cells(named: ViewRequest) -> LoadCells | None:
 
 def _virtual(named: ViewRequest) -> Any:
     if named.port is not None:
+        if Sim.parse(named.port).pace not in (None, 1.0):
+            raise ContactFPGAError(f"{named.port}: the view shows a virtual board in real time; leave out pace")
         return transport.virtual_board(named.port)
     if named.skin is not None:  # with its cover and its circuit
         return transport.virtual_board(f"sim://?scene=nothing&skin={quote(str(named.skin), safe='/')}")

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from contactfpga.driver.board import Board
+from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ReadTimeout
 from contactfpga.robot.haptics import Contacts, LoadCells, felt
@@ -32,29 +33,20 @@ SMOOTHING = 0.2
 WINDOW_S = 2.0
 
 
-class SimulatedPace:
-    """Rations simulated time, so that a board runs in real time, or slower on a slow machine."""
+class SimulatedPace(Pace):
+    """A board's real time, or slower on a slow machine, whose speed it measures."""
 
     def __init__(self, simulated_s: float, clock: Callable[[], float] = time.monotonic):
-        self._clock = clock
-        self._begin = clock() - simulated_s  # when simulated time was 0, slip taken out
-        self.slip_s = 0.0
-        """Seconds of simulated time lost for good."""
+        super().__init__(simulated_s, most_lag_s=MAX_LAG_S, clock=clock)
         self._speed = 1.0
         self._seen: collections.deque[tuple[float, float]] = collections.deque([(clock(), simulated_s)])
 
-    def due(self, simulated_s: float) -> float:
-        """Seconds of simulated time due now; below 0: none for that long."""
+    def due(self, at_s: float) -> float:
         now = self._clock()
-        behind = now - self._begin - simulated_s
-        if behind > MAX_LAG_S:
-            self.slip_s += behind - MAX_LAG_S
-            self._begin += behind - MAX_LAG_S
-            behind = MAX_LAG_S
-        self._seen.append((now, simulated_s))
+        self._seen.append((now, at_s))
         while now - self._seen[0][0] > WINDOW_S:
             self._seen.popleft()
-        return behind
+        return super().due(at_s)
 
     def ran(self, simulated_s: float, seconds: float) -> None:
         """Report the computing time of a simulated duration."""

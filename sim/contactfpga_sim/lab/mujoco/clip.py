@@ -38,8 +38,8 @@ class Asked(SimulatedPace):
 
     until_s = 0.0
 
-    def due(self, simulated_s: float) -> float:
-        return self.until_s - simulated_s
+    def due(self, at_s: float) -> float:
+        return self.until_s - at_s
 
 
 def paced(found: SimulatedSource) -> Asked:

@@ -43,7 +43,7 @@ def measured(reader: str, busy: bool, switch_s: float) -> Missed:
 
                 with contextlib.suppress(StopIteration):
                     while True:
-                        silent += loop.guard(board, step).reason == "silence"
+                        silent += loop.guard(board, step, lambda: None).reason == "silence"
             finally:
                 sys.setswitchinterval(usual)
     periods = {int((moment - begun[0]) / loop.PERIOD_S) for moment in begun}

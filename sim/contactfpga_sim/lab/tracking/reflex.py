@@ -64,7 +64,7 @@ def measured(rounds: int = ROUNDS) -> ReactionTimes:
         while number < last:
             while board.latest(10.0).pressed:
                 pass
-            stop = loop.guard(board, lambda: None)
+            stop = loop.guard(board, lambda: None, lambda: None)
             if stop.reason != "contact":
                 silent += 1
                 continue

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.cover import Cover
+from contactfpga.driver.pace import Pace
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several, sheets_of
@@ -27,7 +28,7 @@ CHUNK_S = 0.5e-3
 """Simulated time between two reads of the port."""
 
 MAX_LAG_S = 0.02
-"""Largest lag of simulated time that is caught up; a larger lag stays."""
+"""Largest lag of simulated time that is caught up; what is beyond it stays."""
 
 SLIP_LIMIT = 0.05
 """Share of real time lost in :data:`SLIP_WINDOW_S` above which a report is due."""
@@ -57,7 +58,7 @@ class PtyBoard:
         circuit: Circuit | None = None,
     ):
         self.skins = skin.skins if isinstance(skin, Several) else (skin or Skin(),)
-        self._stopping = threading.Event()
+        self._stopping = False  # and no Event, whose lock the handler of a second signal would wait for
         self._thread: threading.Thread | None = None
         # The board keeps its own end of the slave open: without it, a client that leaves would end the terminal.
         self._master, self._slave = os.openpty()
@@ -96,7 +97,7 @@ class PtyBoard:
 
     def stop(self) -> None:
         """End the board and its port; an open client is hung up. May be called twice."""
-        self._stopping.set()
+        self._stopping = True
         if self._thread and self._thread is not threading.current_thread():
             self._thread.join()
         if self._master >= 0:
@@ -147,15 +148,13 @@ class PtyBoard:
 
     def _run(self) -> None:
         cycles = max(1, round(CHUNK_S * self.skins[0].clock_hz))
-        begin = time.monotonic() - self._board.clock()  # when simulated time was 0, slip taken out
+        pace = Pace(self._board.clock(), most_lag_s=MAX_LAG_S)
         window, window_slip = time.monotonic(), self.slip
-        while not self._stopping.is_set():
-            ahead = self._board.clock() - (time.monotonic() - begin)
-            if ahead < -MAX_LAG_S:
-                self.slip -= ahead
-                begin -= ahead
+        while not self._stopping:
+            ahead = pace.wait_s(self._board.clock())
+            self.slip = pace.slip_s
             self._listen(max(0.0, ahead))
-            if ahead > 0 and self._board.clock() > time.monotonic() - begin:
+            if ahead > 0 and pace.wait_s(self._board.clock()) > 0:
                 continue  # woken by a client before it is time
             self._board.advance(cycles)
             self._speak(self._board.read(0))
@@ -199,7 +198,7 @@ class PtyBoard:
     @contextlib.contextmanager
     def _ended_by_signals(self) -> Iterator[None]:
         def end(*_: object) -> None:
-            self._stopping.set()
+            self._stopping = True
 
         before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
         try:

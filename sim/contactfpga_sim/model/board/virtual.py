@@ -82,6 +82,7 @@ class VirtualBoard:
         look_s: float = CHUNK_S,
     ):
         self.skin = skin or Skin()
+        self.skins = (self.skin,)
         self._look_s = look_s
         self._units = _unit_source(self.skin, scene, units)
         self._scene = make_scene(self.skin, scene, cover)
@@ -158,7 +159,7 @@ class VirtualSheets:
     """
 
     def __init__(self, several: Several, scenes: Sequence[Source]):
-        self.several = several
+        self.several, self.skins = several, several.skins
         self._scenes = [make_scene(skin, scene) for skin, scene in zip(several.skins, scenes, strict=True)]
         self._board = CompiledSheets(several)
         self._chunk = max(1, round(CHUNK_S * several.clock_hz))
@@ -189,8 +190,8 @@ class VirtualSheets:
 
 
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
-    """The board at ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``; ``skin``: default without a file.
-    Raises :class:`~contactfpga.AddressError`, and the errors of its files."""
+    """The board at a ``sim://`` address, whatever its pace; ``skin``: default without a file. Raises
+    :class:`~contactfpga.AddressError`, and the errors of its files."""
     address = Sim.parse(name)
     cover, circuit, units = None, None, None
     several = Several.load(address.sheets) if address.sheets is not None else None

@@ -99,13 +99,12 @@ def _cells(zones: Zones) -> np.ndarray:
 
 def _restored(board: Board, timeout: float) -> list[Finding]:
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
-        try:
-            board.sample_at(0, timeout)
-            return []
-        except KeyboardInterrupt:
-            continue
-        except ContactFPGAError:
-            break
+        with interrupt.usual_end():
+            try:
+                board.sample_at(0, timeout)
+                return []
+            except ContactFPGAError:
+                break
     left = (
         f"{board.port} may still sample too early, so that pressed switches read released; switch it off and on, or "
         "run this command again"
