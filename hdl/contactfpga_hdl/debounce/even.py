@@ -13,6 +13,7 @@ class Switch:
 
     def __init__(self, word_bits: int):
         self.raw = Signal()
+        self.fresh = Signal()  # it was never walked since reset, which leaves the memory as it is
         self.word = Signal(word_bits)
         self.next_word = Signal(word_bits)
         self.next_pressed = Signal()
@@ -32,7 +33,8 @@ class Debounce(wiring.Component):
     """Raw rows in, debounced rows out; one column per clock, C columns take C + 3 clocks.
 
     A memory has a word per switch: with ``sym_defer_pk`` its state and the samples for which the raw one has differed,
-    with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0.
+    with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0. In the first frame after reset
+    each word reads 0.
 
     raw (in): a frame's rows in ascending order; taken when the row before has left.
     rows (out): debounced rows.
@@ -56,8 +58,10 @@ class Debounce(wiring.Component):
         else:
             _eager_press(m, switch, press, release)
         last = walk_columns(m, self.skin, self.raw, self.rows, row, switch, phase)
+        known = Signal()  # a whole frame was walked
+        m.d.comb += switch.fresh.eq(~known)
         with m.If(phase.finish):
-            m.d.sync += row.eq(Mux(last, 0, row + 1))
+            m.d.sync += [row.eq(Mux(last, 0, row + 1)), known.eq(known | last)]
         return m
 
 
@@ -107,7 +111,7 @@ def walk_columns(
     address, store_address = Signal.like(write.addr), Signal.like(write.addr)
     m.d.comb += [
         read.addr.eq(Cat(column[:column_bits], row[:row_bits])),
-        switch.word.eq(read.data),
+        switch.word.eq(Mux(switch.fresh, 0, read.data)),
         write.en.eq(phase.store),
         write.addr.eq(store_address),
         raw.ready.eq(~phase.busy & ~phase.decide & ~phase.store & ~rows.valid),
