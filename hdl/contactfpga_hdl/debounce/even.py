@@ -13,7 +13,7 @@ class Switch:
 
     def __init__(self, word_bits: int):
         self.raw = Signal()
-        self.fresh = Signal()  # it was never walked since reset, which leaves the memory as it is
+        self.fresh = Signal()  # the word counts as 0: it is from before a reset, which leaves the memory as it is
         self.word = Signal(word_bits)
         self.next_word = Signal(word_bits)
         self.next_pressed = Signal()
@@ -66,7 +66,8 @@ class Debounce(wiring.Component):
 
 
 def _defer_both(m: Module, switch: Switch, press: int, release: int) -> None:
-    pressed, differed = switch.word[0], switch.word[1:]
+    word = Mux(switch.fresh, 0, switch.word)
+    pressed, differed = word[0], word[1:]
     differs = switch.raw != pressed
     changes = differs & (differed == Mux(pressed, release, press))
     m.d.comb += [
@@ -77,7 +78,7 @@ def _defer_both(m: Module, switch: Switch, press: int, release: int) -> None:
 
 def _eager_press(m: Module, switch: Switch, press: int, release: int) -> None:
     defer = release + 1
-    with m.If(switch.word == 0):
+    with m.If(switch.fresh | (switch.word == 0)):
         m.d.comb += switch.next_word.eq(Mux(switch.raw, defer + max(0, press - 1), 0))
     with m.Elif((switch.word <= defer) & switch.raw):
         m.d.comb += switch.next_word.eq(defer)
@@ -111,7 +112,7 @@ def walk_columns(
     address, store_address = Signal.like(write.addr), Signal.like(write.addr)
     m.d.comb += [
         read.addr.eq(Cat(column[:column_bits], row[:row_bits])),
-        switch.word.eq(Mux(switch.fresh, 0, read.data)),
+        switch.word.eq(read.data),
         write.en.eq(phase.store),
         write.addr.eq(store_address),
         raw.ready.eq(~phase.busy & ~phase.decide & ~phase.store & ~rows.valid),

@@ -74,7 +74,7 @@ class _TimedSwitch(Switch):
     def __init__(self, m: Module, now: Value):
         bits = len(now)
         super().__init__(2 + bits)
-        self.state, since = self.word[:2], self.word[2:]
+        self.state, since = Mux(self.fresh, 0, self.word[:2]), self.word[2:]
         self.next_state = Signal(2)
         self.starts = Signal()  # a time begins
         self.elapsed = Signal(bits)
