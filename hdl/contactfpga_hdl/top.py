@@ -155,7 +155,9 @@ class Top(wiring.Component):
     def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
-        m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
+        stuck = scan.stuck if self.derived.scan.waits else 0  # before a frame begins and counts it
+        told = scan.faults.as_value().any() if hasattr(scan, "faults") else 0
+        m.d.comb += fault.eq(scan.tag.fault | stuck | told)
         # Where one may fall as another rises, a register keeps that from the pin.
         if self.skin.fail_safe:
             level = scan.contact | over | fault | unwatched | self._blind(m, packer)

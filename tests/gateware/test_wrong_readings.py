@@ -5,13 +5,15 @@ An undriven column with a pressed switch reads pressed, too, as in a real sheet;
 
 import itertools
 import random
+import sys
 
 import numpy as np
 import pytest
-from reversal import FAST, any_skin, checked_soon, small
+from reversal import FAST, any_skin, checked_soon, noted_pins, small
 from sample import sample
 
 from contactfpga.skin import Skin
+from contactfpga_hdl.link import alive
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict, requests
@@ -122,6 +124,32 @@ def test_a_column_that_stays_low_costs_its_own_cells_is_told_and_is_tried_every_
     assert max(group[-1] - group[0] for group in tries) < ms // 5
 
 
+def test_at_rest_a_column_that_goes_low_is_known_at_once(soon, pins):
+    """Without guard lines: as soon as it is let go, ``contact`` is high, and a frame says why, with nothing touched.
+    Another column is touched meanwhile. Once the column is found whole, all is as before."""
+    skin, low = small(fail_safe=True, alive=True), np.arange(4) == 2
+    nothing, touched = np.zeros((3, 4), bool), np.zeros((3, 4), bool)
+    touched[1, 0] = True
+    pieces = [(5_000, nothing, low), (6_000, touched, low), (6_300, nothing, low), (6_500, nothing, None)]
+    trace = bench_amaranth.run(skin, Timeline(pieces), 10_000)
+    let_go = [cycle for cycle, levels in enumerate(pins) if cycle > 5_000 and not levels["columns_drive"] >> 2 & 1]
+    frames = list(frames_in(skin, trace.bytes))
+    first, *others = (one for one in frames if one.first > 5_000)
+    renewed = next(one for one in others if "fault" not in one.frame.flags)
+    (rise, high), (fall, _) = trace.contact
+    project = facts(skin).project
+    assert high
+    assert 0 <= rise - let_go[0] <= project
+    assert ("fault" in first.frame.flags, first.frame.moments.tolist()) == (True, [])
+    assert first.first - rise < 40
+    assert [(1, 0, 1), (1, 2, 1)] in [sorted(map(tuple, one.frame.moments)) for one in others]
+    assert 64 * 24 * 5 < fall < 64 * 24 * 5 + 3 * 64 + project, "tried after 320 us"
+    assert 0 < renewed.first - fall < 40
+    turns = [cycle for cycle, _ in trace.alive]
+    assert not any(rise <= turn < fall for turn in turns)
+    assert {turn // 480 for turn in turns} >= {*range(1, rise // 480), *range(fall // 480 + 2, 10_000 // 480)}
+
+
 def any_history(rng: random.Random, skin: Skin, cycles: int) -> Timeline:
     """Touches, columns that are wrong for up to 8 clocks, and some that stay so for any time."""
     pieces, start = [], rng.randrange(100)
@@ -146,12 +174,19 @@ def any_history(rng: random.Random, skin: Skin, cycles: int) -> Timeline:
 
 @pytest.fixture
 def soon(monkeypatch):
-    """Columns are tried every 64 us, and a sheet at rest is checked every 16 us."""
+    """Columns are tried every 64 us, a sheet at rest is checked every 16 us, and ``alive`` turns every 20 us."""
     checked_soon(monkeypatch, check_bit=4, retry_bit=6)
+    for module in (alive, sys.modules[predict.__module__]):
+        monkeypatch.setattr(module, "TICK_US", 20)
+
+
+@pytest.fixture
+def pins(monkeypatch):
+    return noted_pins(monkeypatch)
 
 
 KINDS = [
-    {"mask": ((0, 1), (1, 1), (2, 1)), "diodes": "row2col", "precharge_us": 1.2},
+    {"mask": ((0, 1), (1, 1), (2, 1)), "diodes": "row2col", "precharge_us": 1.2, "fail_safe": True, "alive": True},
     {"send": "always", "debounce": "sym_defer_pk", "debounce_press_us": 7.0, "debounce_release_us": 12.0},
     {"guard": True, "fail_safe": True, "alive": True},
     {"guard": True, "send": "always", "diodes": "row2col", "self_test": True, "project_us": 0.05, "precharge_us": 1.2},

@@ -91,6 +91,8 @@ def random_frames(rng, skin, count, spacing=1):
         widths = TAG | SUMMARY
         facts = {name: rng.randrange(1 << width) for name, width in widths.items()} | {"time": index}
         facts["requested"] = int(rng.random() < 0.15)
+        turns = facts["fault"] & facts["overflow"] & facts["mismatch"]  # now and then, as each change is sent
+        facts["fault"] = frames[-1].facts["fault"] ^ turns if index > 1 else 0
         if index in (0, 1):  # the first one goes out all the same, the second one waits for the keep-alive
             facts |= {"changed": 0, "requested": 0}
         length = rng.choice((1, 1, spacing, 3 * spacing)) * (most * size + 32)
@@ -103,14 +105,15 @@ def random_frames(rng, skin, count, spacing=1):
 
 def decisions(skin, frames, keep_alive):
     """(cycle of the decision, whether sent) for each frame: none of it depends on the wire."""
-    size, free, idle, out = ITEM_BYTES[skin.report], 0, None, []
+    size, free, idle, fault, out = ITEM_BYTES[skin.report], 0, None, 0, []
     for frame in frames:
         for put in frame.not_before[:-1]:
             free = max(put + 2, free) + size
         taken = max(frame.not_before[-1] + 2, free)
         idle = None if idle is None else idle + 1
         facts = frame.facts
-        sent = skin.send == "always" or bool(facts["changed"] or facts["requested"])
+        sent = skin.send == "always" or bool(facts["changed"] or facts["requested"] or facts["fault"] != fault)
+        fault = facts["fault"]
         sent = sent or idle is None or idle == keep_alive
         idle = 0 if sent else idle
         free = taken + (TRAILER_BYTES + 2 if sent else 1)

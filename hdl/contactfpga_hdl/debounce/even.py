@@ -13,6 +13,7 @@ class Switch:
 
     def __init__(self, word_bits: int):
         self.raw = Signal()
+        self.fresh = Signal()  # the word counts as 0: it is from before a reset, which leaves the memory as it is
         self.word = Signal(word_bits)
         self.next_word = Signal(word_bits)
         self.next_pressed = Signal()
@@ -32,7 +33,8 @@ class Debounce(wiring.Component):
     """Raw rows in, debounced rows out; one column per clock, C columns take C + 3 clocks.
 
     A memory has a word per switch: with ``sym_defer_pk`` its state and the samples for which the raw one has differed,
-    with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0.
+    with ``asym_eager_defer_pk`` the samples until the switch counts as released, or 0. In the first frame after reset
+    each word reads 0.
 
     raw (in): a frame's rows in ascending order; taken when the row before has left.
     rows (out): debounced rows.
@@ -56,13 +58,16 @@ class Debounce(wiring.Component):
         else:
             _eager_press(m, switch, press, release)
         last = walk_columns(m, self.skin, self.raw, self.rows, row, switch, phase)
+        known = Signal()  # a whole frame was walked
+        m.d.comb += switch.fresh.eq(~known)
         with m.If(phase.finish):
-            m.d.sync += row.eq(Mux(last, 0, row + 1))
+            m.d.sync += [row.eq(Mux(last, 0, row + 1)), known.eq(known | last)]
         return m
 
 
 def _defer_both(m: Module, switch: Switch, press: int, release: int) -> None:
-    pressed, differed = switch.word[0], switch.word[1:]
+    word = Mux(switch.fresh, 0, switch.word)
+    pressed, differed = word[0], word[1:]
     differs = switch.raw != pressed
     changes = differs & (differed == Mux(pressed, release, press))
     m.d.comb += [
@@ -73,7 +78,7 @@ def _defer_both(m: Module, switch: Switch, press: int, release: int) -> None:
 
 def _eager_press(m: Module, switch: Switch, press: int, release: int) -> None:
     defer = release + 1
-    with m.If(switch.word == 0):
+    with m.If(switch.fresh | (switch.word == 0)):
         m.d.comb += switch.next_word.eq(Mux(switch.raw, defer + max(0, press - 1), 0))
     with m.Elif((switch.word <= defer) & switch.raw):
         m.d.comb += switch.next_word.eq(defer)

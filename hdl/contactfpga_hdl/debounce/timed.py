@@ -12,7 +12,8 @@ from contactfpga_hdl.payloads import row_layout
 class TimedDebounce(wiring.Component):
     """Raw rows in, debounced rows out; a row that was driven alone takes C + 3 clocks, other rows none.
 
-    Other rows are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
+    Other rows are quiet: no cell reads pressed, and no switch counts as pressed or has a time running. After reset all
+    rows are quiet.
 
     raw (in): a frame's rows in ascending order.
     alone (in): the offered row was driven alone.
@@ -73,7 +74,7 @@ class _TimedSwitch(Switch):
     def __init__(self, m: Module, now: Value):
         bits = len(now)
         super().__init__(2 + bits)
-        self.state, since = self.word[:2], self.word[2:]
+        self.state, since = Mux(self.fresh, 0, self.word[:2]), self.word[2:]
         self.next_state = Signal(2)
         self.starts = Signal()  # a time begins
         self.elapsed = Signal(bits)
@@ -108,6 +109,9 @@ class _TimedWalk(wiring.Component):
         else:
             _eager_press(m, switch, self.derived.press_ticks, self.derived.release_ticks)
         walk_columns(m, self.skin, self.raw, self.rows, self.row, switch, phase)
+        # All words of a quiet row are 0, whatever the memory holds since before a reset. The row is the same from a
+        # clock before the first word on.
+        m.d.sync += switch.fresh.eq(~self.busy.bit_select(self.row, 1))
         kept = Signal()  # a switch so far was not quiet
         with m.If(phase.decide):
             m.d.sync += kept.eq(kept | (switch.next_word != 0))

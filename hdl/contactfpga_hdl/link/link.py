@@ -173,7 +173,11 @@ class Link(wiring.Component):
             from contactfpga_hdl.link.due import keep_alive
 
             keep_alive(m, self)
-            m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | self.due)
+            fault_before = Signal()  # the flag of the frame before
+            with m.If(decide):
+                m.d.sync += fault_before.eq(self.tag.fault)
+            changed = self.summary.changed | self.tag.fault ^ fault_before
+            m.d.comb += verdict.send.eq(changed | self.tag.requested | self.due)
         return frames_sent
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:

@@ -1,6 +1,6 @@
 """Scan by line reversal."""
 
-from amaranth.hdl import Cat, Module, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -36,7 +36,9 @@ class ReversalScanner(wiring.Component):
     watched (out): pulse when a resting sheet was watched for another 256 us; with ``guard`` when it was checked.
     packed (in): pulse when the frame is packed.
     time (out): device time in us.
-    due (in): a frame is wanted without a touch.
+    due (in): a frame is wanted without a touch. One is also wanted when what is known of faults differs from the last
+        frame's flag.
+    stuck (out): high while a column is stuck, the guard column excepted.
     contact (out): rises three clocks after a touch of an untouched sheet; falls with a frame without a pressed switch.
     alone (out): the offered row was driven.
     sampled (out): time of its sample.
@@ -57,6 +59,7 @@ class ReversalScanner(wiring.Component):
                 "sampled": Out(self.derived.tick_bits),
                 "busy": In(skin.rows),
                 "watched": Out(1),
+                "stuck": Out(1),
             }
         )
 
@@ -72,7 +75,8 @@ class ReversalScanner(wiring.Component):
             read.eq(rows & sum(1 << row for row in range(skin.rows) if present(skin, row))),
             cycle.touched.eq(read | (self.busy if self.derived.debounced else 0)),
             cycle.packed.eq(self.packed),
-            cycle.wanted.eq(clock.waiting | self.due if skin.send == "on_change" else 1),
+            cycle.wanted.eq(clock.waiting | self.due | self._news(m) if skin.send == "on_change" else 1),
+            self.stuck.eq(precharge.held[: skin.columns].any()),
         ]
         if moves_sample(self.derived):
             m.d.comb += [cycle.moves.eq(self.moves), cycle.clocks.eq(self.clocks)]
@@ -87,6 +91,17 @@ class ReversalScanner(wiring.Component):
         if test is not None:
             self._test_lines(m, cycle, test, read, pressed)
         return m
+
+    def _news(self, m: Module) -> Value:
+        """Whether what is known of faults differs from the last frame's flag. It may be late by a clock: between two
+        beginnings of frames are more."""
+        news = Signal()
+        m.d.sync += news.eq((self.stuck | self._told) ^ self.tag.fault)
+        return news
+
+    @property
+    def _told(self) -> Value:
+        return self.faults.as_value().any() if "faults" in self.signature.members else Const(0)
 
     def _read_sheet(self, m: Module, pressed: Signal) -> Value:
         skin = self.skin
@@ -161,11 +176,12 @@ class ReversalScanner(wiring.Component):
         ]
         with m.If(cycle.strobe):
             m.d.sync += self.sampled.eq(clock.time)
-        at_begin, counted = Signal(), Signal(2)  # the last bit: the columns are counted in the next clock
+        at_begin = Signal()
+        counted = Signal(2)  # the last bit: the columns are counted in the next clock
         if "faults" in self.signature.members:
             m.d.sync += counted.eq(Cat(cycle.begins, counted))
             with m.If(counted[1]):
-                m.d.sync += at_begin.eq(self.faults.as_value().any())
+                m.d.sync += at_begin.eq(self._told)
         m.d.comb += self.tag.fault.eq(self.tag.stuck.any() | at_begin)
         return toggles
 

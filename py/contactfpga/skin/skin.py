@@ -113,8 +113,8 @@ class Skin:
     barycenter_bits: int = field(default=4, metadata={"limits": (0, MAX_BARYCENTER_BITS, "")})
     """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
     send: Literal["always", "on_change"] = "always"
-    """``always``: every frame is sent. ``on_change``: only keep-alives, and frames whose cells differ from the last
-    one.
+    """``always``: every frame is sent. ``on_change``: only keep-alives, and frames whose cells or flag
+    ``fault`` differ from the last one.
     """
     keep_alive_ms: float = field(default=100.0, metadata={"limits": (0.0, 100.0, "ms")})
     """Longest pause between frames with ``send = "on_change"``, in ms."""

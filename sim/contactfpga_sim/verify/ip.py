@@ -44,7 +44,7 @@ write_verilog -norename -noattr core.v"""
 
 MEANINGS = {
     "clk": "clock; times of the sheet hold at {clock_hz:,} Hz",
-    "rst": "synchronous reset, high; hold it for 4 clocks",
+    "rst": "synchronous reset, high; hold it for 4 clocks. Then the core is as at power-up",
     "rows": "to the rows of the sheet",
     "columns": "from the columns of the sheet; two registers synchronize them inside",
     "row_data": "to the data pins of the rows' shift registers",

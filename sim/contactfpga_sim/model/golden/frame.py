@@ -55,6 +55,7 @@ class Packer:
         self._since_sent = 0
         self._since_hello = 0
         self._before: np.ndarray | None = None
+        self._fault_before = False
         self.due = 0
         """Cycle from which an unchanged frame is sent, for a scan that waits."""
         self._overwritten = 0
@@ -80,7 +81,7 @@ class Packer:
             self.due = (taken // period + self._facts.keep_alive_periods) * period + 1
         else:
             self._free = taken + 1
-        self._before = items.cells
+        self._before, self._fault_before = items.cells, items.scan.fault
         if not self._facts.scan.waits and self._since_hello >= self._facts.hello_slots:
             self._link.want_hello(taken + 1)
             self._since_hello = 0
@@ -89,7 +90,7 @@ class Packer:
     def _is_sent(self, items: Items, taken: int) -> bool:
         if self._facts.skin.send == "always" or self._before is None or items.scan.requested:
             return True
-        changed = not np.array_equal(items.cells, self._before)
+        changed = items.scan.fault != self._fault_before or not np.array_equal(items.cells, self._before)
         if self._facts.scan.waits:
             return changed or taken >= self.due
         return changed or self._since_sent >= self._facts.keep_alive_slots

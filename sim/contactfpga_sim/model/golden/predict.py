@@ -91,7 +91,7 @@ def _play(
     rule: scan.ScanRule = scans.find(skin.scan).load_golden()
     scanned = rule.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
-    faulty = _fault(frames, stages.told)
+    faulty = _fault(frames, stages.told, scanned.stuck)
     touched = _either(scanned.contact, pressed.over)
     unwatched = [(0, 1), *((cycle, 1 - level) for cycle, level in pressed.armed)] if skin.units else []
     if skin.fail_safe:
@@ -267,13 +267,13 @@ def _word(cells: np.ndarray) -> int:
 TICK_US = 1000
 
 
-def _fault(scanned: Iterable[scan.Scan], told: scan.Changes) -> scan.Changes:
-    marks = [(one.told, 0, one.fault) for one in scanned] + [(cycle, 1, word > 0) for cycle, word in told]
-    by_tag = by_lines = False
-    levels = []
-    for cycle, of_lines, level in sorted(marks):
-        by_tag, by_lines = (by_tag, level) if of_lines else (level, by_lines)
-        levels.append((cycle, int(by_tag or by_lines)))
+def _fault(scanned: Iterable[scan.Scan], told: scan.Changes, stuck: scan.Changes) -> scan.Changes:
+    sources = [(one.told, int(one.fault)) for one in scanned], [(cycle, int(word > 0)) for cycle, word in told], stuck
+    marks = [(cycle, source, level) for source, changes in enumerate(sources) for cycle, level in changes]
+    known, levels = [0, 0, 0], []
+    for cycle, source, level in sorted(marks):
+        known[source] = level
+        levels.append((cycle, max(known)))
     return _changes(levels)
 
 

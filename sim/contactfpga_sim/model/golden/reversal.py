@@ -8,6 +8,7 @@ import numpy as np
 
 from contactfpga_sim.model.golden import debounce, reversal_lines
 from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.faults import FaultHistory
 from contactfpga_sim.model.golden.guard import closed, stuck
 from contactfpga_sim.model.golden.request import Request
 from contactfpga_sim.model.golden.reversal_lines import GuardChecks, SelfTestModel, StuckColumns
@@ -87,9 +88,16 @@ class ReversalScanModel:
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
+        self._told = FaultHistory()
+        self._flag = False  # the last frame's for faults
         self._held = StuckColumns(facts, play.timeline)
         self.checks = GuardChecks(facts, play.timeline, self._held) if facts.skin.guard else None
         self.test = SelfTestModel(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
+
+    @property
+    def stuck(self) -> Changes:
+        """Changes of whether any column is known to be stuck."""
+        return self._held.known()
 
     def frame(self) -> None:
         """Run the next frame."""
@@ -110,7 +118,7 @@ class ReversalScanModel:
             faults=self._word,
         )
         self.begun.append(begun)
-        self._rests = not todo
+        self._rests, self._flag = not todo, scan.fault
         rows = self._stages.rows()
         counted = self._drive(begun, todo, rows, scan.cells)
         if not scan.cells.any():
@@ -130,6 +138,9 @@ class ReversalScanModel:
             check = max(self.checks.asked, begin) if self.checks else wanted + 1
             until = min(wanted, check)
             self._held.rests(begin, until)
+            if (news := self._news(max(self._packed, begin), until)) < until:
+                wanted = until = news
+                self._held.cut(until)
             touched = self._first_touched(begin - 2, until - 2)
             test = self._test_asked(begin, until if touched is None else touched + 1)
             if test is not None:
@@ -163,7 +174,22 @@ class ReversalScanModel:
         assert self.test is not None
         sample = self.test.slot(cycle)
         self._listens = sample + 4
-        self._stages.tell(sample + 3, self._word)
+        self._tell(sample + 3)
+
+    def _tell(self, cycle: int) -> None:
+        self._told.change(cycle, self._word)
+        self._stages.tell(cycle, self._word)
+
+    def _news(self, begin: int, end: int) -> int:
+        """First cycle from ``begin`` on after one in which what is known of faults differs from the last flag, or
+        ``end``; reported lines do not change later than in ``begin``."""
+        if self._facts.skin.send == "always":
+            return end
+        changes = {begin, begin + 1, *(cycle + 1 for cycle, _ in self._held.known(begin, end))}
+        return next((cycle for cycle in sorted(changes) if cycle < end and self._known(cycle - 1) != self._flag), end)
+
+    def _known(self, cycle: int) -> bool:
+        return bool(self._held.at(cycle)[: self._facts.columns].any() or self._told.at(cycle))
 
     @property
     def _word(self) -> int:
@@ -188,7 +214,7 @@ class ReversalScanModel:
         if guard_is_stuck:
             self._held.guard_found(checked + 2)
         self._listens = checked + 2
-        self._stages.tell(checked + 3, self._word)
+        self._tell(checked + 3)
 
     def _wanted(self) -> int:
         before = self.begun[-1]
@@ -277,7 +303,7 @@ class Reversal(ScanRule):
         driven = [change for begin, end, row in slots for change in ((begin, 1 << row), (end + 1, 0))]
         if scanner.test:
             driven = sorted(driven + scanner.test.discharged)
-        return ScanOutput(scanner.contact, driven, scanner.begun)
+        return ScanOutput(scanner.contact, driven, scanner.begun, scanner.stuck)
 
 
 REVERSAL = Reversal()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,6 +52,7 @@ class StuckColumns:
         everything = np.ones(facts.columns, bool)
         self._states = [_State(-1, 0, everything, ~everything)]
         self._moved: list[int] = []  # cycles after which other columns are let go
+        self._found: list[int] = []  # cycles after which there are stuck columns, and after which there are none
         self._guard: list[int] = []
 
     def rests(self, begin: int, end: int) -> None:
@@ -63,8 +65,9 @@ class StuckColumns:
         """The last rest ends with this cycle."""
         while self._states[-1].cycle > cycle:
             self._states.pop()
-        while self._moved and self._moved[-1] > cycle:
-            self._moved.pop()
+        for cycles in (self._moved, self._found):
+            while cycles and cycles[-1] > cycle:
+                cycles.pop()
         self._rest(cycle)
 
     def look(self, cycle: int) -> None:
@@ -90,7 +93,15 @@ class StuckColumns:
         first = bisect.bisect_left(self._moved, begin - 2)
         return [cycle + 2 for cycle in self._moved[first:] if cycle + 2 <= end]
 
+    def known(self, begin: int = 0, end: float = math.inf) -> list[tuple[int, int]]:
+        """(cycle, level) of every change, from ``begin`` to before ``end``, of whether any column is stuck."""
+        first = bisect.bisect_left(self._found, begin - 1)
+        changes = [(cycle + 1, 1 - place % 2) for place, cycle in enumerate(self._found[first:], first)]
+        return [change for change in changes if change[0] < end]
+
     def _go_to(self, state: _State) -> None:
+        if state.stuck.any() != self._states[-1].stuck.any():
+            self._found.append(state.cycle)
         if (state.let_go != self._states[-1].let_go).any():
             self._moved.append(state.cycle)
         self._states.append(state)

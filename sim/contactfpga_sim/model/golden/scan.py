@@ -61,6 +61,8 @@ class ScanOutput:
     """Changes of the driven rows; bit r is row r."""
     beginnings: list[int]
     """First cycles of frames, one beyond."""
+    stuck: Changes = dataclasses.field(default_factory=list)
+    """Changes of whether any column is known to be stuck, for a scan that waits."""
 
 
 class Rows(Protocol):

@@ -228,7 +228,8 @@ def first_is_sent(proof: Proof, **changes: Any) -> None:
     """Free: decisions about frames, and frames' contents. Given: each frame needed a row time or more.
 
     Claimed: no frame is dropped before one was sent. So after a restart a frame is packed before any is dropped, and
-    ``contact`` can wait for its ``commit``.
+    ``contact`` can wait for its ``commit``. Nor is a frame dropped whose flag for faults differs from that of the frame
+    before.
     """
     dut = Link(Skin(rows=2, columns=2, send="on_change", **changes))
     inside = proof.put(dut)
@@ -241,6 +242,11 @@ def first_is_sent(proof: Proof, **changes: Any) -> None:
     sent = Signal(name="sent_one")
     proof.m.d.sync += sent.eq(sent | decide & sends)
     proof.claim(~decide | sends | sent)
+    flag = Signal()  # of the frame before
+    with proof.m.If(decide):
+        proof.m.d.sync += flag.eq(dut.tag.fault)
+    proof.claim(~decide | sends | (dut.tag.fault == flag))
+    proof.lemma(inside["fault_before"] == flag)
     derived = dut.derived
     due = ("toggles", derived.keep_alive_toggles) if derived.scan.waits else ("pause", derived.keep_alive_frames - 1)
     proof.lemma(sent | (inside[due[0]] == due[1]))
@@ -248,6 +254,7 @@ def first_is_sent(proof: Proof, **changes: Any) -> None:
 
 _FIRST_BUGS = (
     Bug("a hello counts for it", Link, "due", lambda due, inside: due & inside["hello_due"]),
+    Bug("a fault is no change", Link, "fault_before", lambda _, inside: inside.component.tag.fault),
     Bug("the time runs out", Link, "pause", lambda _, inside: inside["pause"] + 1),
 )
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from amaranth.hdl import Const, Mux, Signal, Value
 
+from contactfpga_hdl.scan.guard import LineFaults
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.reversal_guard import Checks
@@ -105,6 +106,49 @@ def whole(proof: Proof, **changes: Any) -> None:
     _check_lemmas(sheet, lines, owed, last)
 
 
+def silent(proof: Proof, **changes: Any) -> None:
+    """Free: the sheet and the later stages.
+
+    Claimed: a column that does not read pressed in the last clock in which the guard row is selected is reported three
+    clocks later. So is a row that reads untouched in the last clock but one in which the guard column alone has the
+    released level, unless the guard column reads pressed then or is reported. Each stays reported until a later check
+    that renews. Three clocks after a frame began its flag is set if a line was reported a clock before.
+    """
+    sheet = Sheet(proof, skin_of(guard=True, **changes))
+    told, skin, begun = sheet.dut.faults, sheet.skin, proof.before(proof.before(sheet.begins))
+    y, x = proof.chosen(range(skin.rows), "y"), proof.chosen(range(skin.columns), "x")
+    proof.given((y < skin.rows) & (x < skin.columns))
+    of_columns = proof.before(proof.before(sheet.selected[-1]) & ~sheet.selected[-1])  # and their sample is known
+    of_rows = proof.before(_inverted(sheet)) & ~_inverted(sheet)
+    guard = sheet.pressed_2[-1] | told.stuck[-1]
+    pressed, read = sheet.pressed_2.bit_select(x, 1), sheet.read_2.bit_select(y, 1)
+    renews = sheet.inside["checks.told.renewing"]
+    for line, checked, answers in (
+        (told.columns.bit_select(x, 1), of_columns, pressed),
+        (told.rows.bit_select(y, 1), of_rows, read | guard),
+    ):
+        proof.claim(line | ~proof.before(checked & ~answers))
+        proof.claim(line | ~proof.before(line) | proof.before(checked & renews))
+    proof.claim(~proof.before(begun) | sheet.dut.tag.fault | ~proof.before(told.as_value().any()))
+    pin_lemmas(sheet)
+    synchronizer_lemmas(sheet)
+    _turn_lemmas(sheet)
+    checked, alternate = sheet.inside["cycle.checks_due"], sheet.inside["checks.of_rows"]
+    proof.lemma(of_columns == ((checked == 2) & alternate))
+    proof.lemma(of_rows == ((checked == 2) & ~alternate))
+
+
+def _turn_lemmas(sheet: Sheet) -> None:
+    proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
+    settle, before = sheet.dut.derived.settle_clocks, proof.before(state, init=LISTEN)
+    checks = max(settle, sheet.dut.derived.project_clocks)
+    checked, of_rows, selects = inside["cycle.checks_due"], inside["checks.of_rows"], inside["cycle.selects"]
+    proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
+    proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= checks - settle) | (before == ANSWER)))
+    proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))
+    proof.lemma(~((state == LISTEN) | (state == ANSWER) | selects) | (inside["cycle.todo"] == 0))
+
+
 def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> None:
     proof, state, clock, inside, told = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
@@ -116,11 +160,8 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
         inside["cycle.selects"],
         told.stuck[-1],
     )
+    _turn_lemmas(sheet)
     proof.lemma(~inside["precharge.guard_stuck"] | blind)
-    proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
-    proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= spared) | (before == ANSWER)))
-    proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))
-    proof.lemma(~((state == LISTEN) | (state == ANSWER) | selects) | (inside["cycle.todo"] == 0))
     proof.lemma(~owed | (state != LISTEN) | (checked != 0))
     pending = (state == ANSWER) | selects | (checked != 0)
     proof.lemma(last == (of_rows ^ ~pending))
@@ -158,6 +199,13 @@ _WHOLE_BUGS = (
         lambda _, inside: inside["checked"]),
     Bug("rows only", Checks, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
 )  # fmt: skip
+_SILENT_BUGS = (
+    Bug("no row is told", LineFaults, "faults.rows", lambda *_: 0),
+    Bug("no column is told", LineFaults, "faults.columns", lambda *_: 0),
+    Bug("a row is told once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
+    Bug("columns are never checked", Checks, "checks_columns", lambda *_: 0),
+    Bug("the flag does not say so", ReversalScanner, "at_begin", lambda *_: 0),
+)  # fmt: skip
 CASES = (
     ProofCase("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
     ProofCase("pins never meet", "2x1, guard lines, row2col, shortest times",
@@ -165,4 +213,8 @@ CASES = (
     ProofCase("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
     ProofCase("whole lines are not told", "2x1, row2col, shortest times, debounced",
          partial(whole, rows=2, columns=1, diodes="row2col", debounce="sym_defer_pk", **SHORT), 2, _WHOLE_BUGS, 40),
+    ProofCase("silent lines are told", "3x2, reversal", partial(silent, rows=3, columns=2, project_us=5), 4,
+              _SILENT_BUGS, 60),
+    ProofCase("silent lines are told", "2x1, reversal, row2col, shortest times",
+              partial(silent, rows=2, columns=1, diodes="row2col", **SHORT), 4),
 )  # fmt: skip

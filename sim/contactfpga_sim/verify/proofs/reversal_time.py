@@ -200,6 +200,25 @@ def rises(proof: Proof, **changes: Any) -> None:
     keep_frames(sheet, spec)
 
 
+def faults_are_told(proof: Proof, **changes: Any) -> None:
+    """Free: the sheet, and when rows are taken. Assumed: no frame is packed before its last row is taken.
+
+    Claimed: while the sheet rests, nothing reads touched and the last frame is packed, its flag differs from whether a
+    column is stuck for at most two clocks; then a frame begins. Its flag, from three clocks later on, is what was known
+    in the clock after it began.
+    """
+    sheet = Sheet(proof, skin_of(**changes))
+    spec, dut = Frames(sheet), sheet.dut
+    idle = sheet.inside["cycle.rests"] & ~(spec.underway | spec.packing) & (sheet.wanted == 0)
+    differs, begun = Signal(), proof.before(proof.before(sheet.begins))
+    proof.m.d.comb += differs.eq(idle & (dut.stuck != dut.tag.fault))
+    earlier = proof.before(differs)
+    proof.claim(~(differs & earlier & proof.before(earlier)))
+    proof.claim(~proof.before(begun) | (dut.tag.fault == proof.before(proof.before(dut.stuck))))
+    proof.claim(dut.stuck == sheet.inside.part("precharge").held[: sheet.skin.columns].any())
+    keep_frames(sheet, spec)
+
+
 def _wakes_alone(inside: Inside):
     return inside["rests"] & inside["settled"] & inside["touched"][0]
 
@@ -228,6 +247,11 @@ _CONTACT_BUGS = (
     Bug("for one clock", Contact, "contact", lambda contact, inside: contact & ~inside["contact"]),
     Bug("of row 0 alone", ReversalScanner, "wakes", lambda _, inside: _wakes_alone(inside)),
 )  # fmt: skip
+_TOLD_BUGS = (
+    Bug("with the next frame", ReversalScanner, "news", lambda *_: 0),
+    Bug("of column 0 alone", ReversalScanner, "stuck", lambda _, inside: inside.part("precharge").held[0]),
+    Bug("a frame late", ReversalScanner, "begun", lambda _, inside: inside["rows__valid"]),
+)
 CASES = (
     ProofCase("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **SHORT), 2, _NEXT_BUGS, 32),
     ProofCase("the next frame in time", "3x2, debounced",
@@ -243,4 +267,5 @@ CASES = (
     ProofCase("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     ProofCase("contact in three clocks", "3x2, shortest times, row2col",
               partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
+    ProofCase("faults are told at once", "3x2", partial(faults_are_told, rows=3, columns=2), 4, _TOLD_BUGS, 100),
 )  # fmt: skip
