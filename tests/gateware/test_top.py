@@ -146,4 +146,4 @@ def test_a_register_that_turns_by_itself_starts_all_but_the_transmitter_anew():
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
-    assert seen == dict.fromkeys(WATCHED, [False, False, True])
+    assert seen == {name: [False, False, True] for name in WATCHED}
