@@ -184,7 +184,7 @@ def _started(text: str) -> str:
 
     They compute a block once something in it changes, so each block gets a signal that changes once.
     """
-    text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^  wire \[-1:0\] \S+ ?;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
     return re.sub(r"^(  reg (?:\[\d+:0\] )?_\d+_);$", r"\1 = 0;", "".join(modules), flags=re.MULTILINE)
 
