@@ -126,24 +126,29 @@ WATCHED = (
 
 
 def test_a_register_that_turns_by_itself_starts_all_but_the_transmitter_anew():
-    """Two clocks later each of their registers has the value that it has at power-up."""
-    fragment = Fragment.get(Top(Skin(rows=2, columns=3, settle_us=3.0)), None)
+    """Two clocks later each of their registers has the value that it has at power-up, and then ``contact`` is high with
+    ``fail_safe``."""
+    top = Top(Skin(rows=2, columns=3, settle_us=3.0, fail_safe=True))
+    fragment = Fragment.get(top, None)
     parts = [Inside(part) for part, name, _ in fragment.subfragments if name != "transmitter"]
     registers = [one for part in parts for one in part.registers() if not one.reset_less]
     seen = {name: [] for name in WATCHED}
 
     async def bench(ctx):
+        ctx.set(top.columns, 0b111)
         fresh = [ctx.get(one) for one in registers]
         for name in WATCHED:
             await ctx.tick().repeat(200)
             wrong = Inside(fragment)[name]
             ctx.set(wrong, ctx.get(wrong) ^ 2)
-            for _ in range(3):
-                seen[name].append([ctx.get(one) for one in registers] == fresh)
-                await ctx.tick()
+            for clocks in (2, 1, 1):
+                seen[name].append(([ctx.get(one) for one in registers] == fresh, ctx.get(top.contact)))
+                await ctx.tick().repeat(clocks)
 
     simulator = Simulator(fragment)
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
-    assert seen == {name: [False, False, True] for name in WATCHED}
+    for (before, low), (anew, still_low), (_, high) in seen.values():
+        assert (before, anew) == (False, True)
+        assert (low, still_low, high) == (0, 0, 1)
