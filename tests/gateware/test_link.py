@@ -288,3 +288,17 @@ def test_readings_go_after_each_four_frames_that_follow_one_another(bench):
     sent = [frames[cycle] for cycle, level in enumerate(taken.values) if level]
     assert sent == list(range(4, 4 * len(sent) + 1, 4))
     assert len(sent) > 4
+
+
+def test_carries_that_come_in_one_clock_are_both_counted(bench):
+    """Those of the frames sent and of the epoch, through a carry into a second digit."""
+    dut, count = odometer.Odometer(), 130
+    sim = bench(dut)
+    for pulses in (dut.sent, dut.epoch):
+        sim.drive(pulses, lambda cycle: int(40 <= cycle < 40 * (count + 1) and cycle % 40 == 0))
+    sim.drive(dut.place, lambda cycle: cycle % 16)
+    digit = sim.watch(dut.digit)
+    sim.run(40 * (count + 3))
+    at = 16 * (40 * (count + 2) // 16)
+    state = [digit[at + 1 + place] for place in range(11)]
+    assert state == [0, 0, count % 128, count // 128, 0, 0, 0, count % 128, count // 128, 0, 0]
