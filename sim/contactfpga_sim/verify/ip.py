@@ -270,7 +270,7 @@ def _signal(core: Core, clock_domain: ClockDomain, port: Port) -> Any:
     return clock_domain.rst if port.name == "rst" else getattr(core, port.name)
 
 
-def assertions(skin: Skin, known: list[Port], name: str = NAME) -> str:
+def assertions(skin: Skin, known: list[Port], name: str) -> str:
     """Invariants at the pins, as immediate assertions for Yosys, Verilator and Icarus."""
     declared = ",\n".join(f"    input wire {port.range}{port.name}" for port in known)
     rows = "~rows" if skin.selects_low else "rows"
@@ -335,7 +335,7 @@ def _of_records(skin: Skin) -> str:
 """
 
 
-def testbench(known: list[Port], clocks: int, name: str = NAME) -> str:
+def testbench(known: list[Port], clocks: int, name: str) -> str:
     """A testbench that plays the vectors and compares all outputs in every clock."""
     inside = known[1:]
     takes, gives = ([port for port in inside if port.takes is taken] for taken in (True, False))
@@ -376,7 +376,7 @@ endmodule
 """
 
 
-def example(skin: Skin, known: list[Port], name: str = NAME) -> str:
+def example(skin: Skin, known: list[Port], name: str) -> str:
     """A peripheral of a small bus, with the core inside."""
     told = ("rx", "contact")
     sheet = [port for port in known[2:] if not port.name.startswith(BYTES) and port.name not in told]
@@ -437,12 +437,13 @@ def _place(skin: Skin) -> str:
     if not skin.derived.report.zones:
         return "bit c of a frame's record r is the switch in row r and column c"
     if skin.derived.report.divided:
-        return f"x and y of a zone, in steps of 1/{2**skin.barycenter_bits} of a column and of a row, from the first one on"
-    sums = "(sum_x + columns * turned) / area, modulo the columns (docs/protocol.md has rings)" if skin.closed else "sum_x / area"
+        return f"x and y are in steps of 1/{2**skin.barycenter_bits} of a column and of a row, from the first on"
+    closed = "(sum_x + columns * turned) / area, modulo the columns (docs/protocol.md has rings)"
+    sums = closed if skin.closed else "sum_x / area"
     return f"a zone is at x = {sums}, and y = sum_y / area, in columns and rows from the first one, 0, on"
 
 
-def readme(skin: Skin, known: list[Port], name: str = NAME) -> str:
+def readme(skin: Skin, known: list[Port], name: str) -> str:
     """Ports, settings, and how to try the core."""
     rows = "".join(
         f"| `{port.name}` | {'in' if port.takes else 'out'} | {port.bits} | {port.meaning} |\n" for port in known
@@ -469,10 +470,10 @@ One clock, synchronous reset.
   - record: {record}
   - {_place(skin)}
   - with `tlast`: {closing}
-{meanings}- A frame is offered when it is whole. If one waits and the first word of the next one comes, that takes its place:
-  `number` counts replaced frames, too, so a gap of n says that the reader missed n. With `send = "on_change"` a scan that
-  replaces a frame counts although nothing has changed: a slow reader of a sheet may miss many more frames than a prompt
-  one gets.
+{meanings}- A frame is offered when it is whole. If one waits and the first word of the next one comes, that takes its
+  place: `number` counts replaced frames, too, so a gap of n says that the reader missed n. With `send = "on_change"`
+  a scan that replaces a frame counts although nothing has changed, so a slow reader may miss many more frames than a
+  prompt one gets.
 
     iverilog -g2012 -o tb {name}.v {name}_sva.sv {name}_tb.v && ./tb
     verilator --binary --assert -CFLAGS -std=c++20 --top {name}_tb {name}.v {name}_sva.sv {name}_tb.v
