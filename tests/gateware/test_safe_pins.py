@@ -30,7 +30,7 @@ SKINS = {
 NOTHING = np.zeros((2, 2), bool)
 
 
-def events(skin: Skin, cycles: int, pause: int = 1_500) -> Timeline:
+def events(skin: Skin, cycles: int, pause: int) -> Timeline:
     """Now and then a touch, a stuck column or a cut line, for a time around a tick of the alive pin."""
     rng = np.random.default_rng(skin.guard + 2 * (skin.scan == "raster"))
     pieces, cuts, start = [(0, NOTHING, None)], [(0, Cuts())], 50
@@ -65,7 +65,8 @@ def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
         monkeypatch.setattr(scan, "RETRY_BIT", 9)
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
     skin = SKINS[name]
-    cycles, pause = (20_000, 9_000) if name == "slow frames" else (5_000, 1_500)
+    cycles = 20_000 if name == "slow frames" else 5_000
+    pause = {"slow frames": 9_000, "guarded": 700}.get(name, 1_500)
     timeline = events(skin, cycles, pause)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 20
