@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import sysconfig
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +20,7 @@ SKINS = {
     "shift registers": SMALL.replace(rows=9, columns=10, row_drive="74hc595", column_read="74hc165", settle_us=20.0),
     "cells, serial": SMALL.replace(report="cells", diodes="row2col"),
     "units": SMALL.replace(units=3, converter="mcp3208"),
+    "paced units": SMALL.replace(units=2, converter="ads131m08"),
     "safe": SMALL.replace(alive=True, fail_safe=True, guard=True, labeller="serial"),
 }
 icarus = pytest.mark.skipif(not shutil.which("iverilog"), reason="no Icarus Verilog")
@@ -84,7 +86,7 @@ module stranger;
     wire [31:0] data;
     wire irq, contact;
     integer i, column;
-    contactfpga_peripheral dut (
+    contactfpga_core_peripheral dut (
         .clk(clk), .rst(rst), .select(1'b1), .read(read), .address(address), .data(data), .irq(irq),
         .contact(contact), .rows(rows), .columns(columns), .rx(1'b1)
     );
@@ -144,9 +146,37 @@ def test_yosys_reads_it_and_finds_nothing_wrong(written, name):
     folder = written(name)
     files = "read_verilog contactfpga_core.v example.v; read_verilog -sv -formal contactfpga_core_sva.sv"
     native.yosys(
-        f"{files}; hierarchy -check -top contactfpga_peripheral; proc; check -assert; tee -o stat.txt stat", folder
+        f"{files}; hierarchy -check -top contactfpga_core_peripheral; proc; check -assert; tee -o stat.txt stat", folder
     )
     assert "contactfpga_core" in (folder / "stat.txt").read_text()
+
+
+def test_two_cores_of_different_skins_are_read_together(run, written, tmp_path):
+    """Each file of one has the other's name in place of its own, whatever is in it."""
+    from contactfpga_sim.model.board import native
+
+    (tmp_path / "skin.toml").write_text(SKINS["paced units"].to_toml())
+    status, out, error = run("ip", "--skin", tmp_path / "skin.toml", "--name", "chest", "-o", tmp_path)
+    assert (status, error) == (0, "")
+    files = [Path(line).name for line in out.splitlines()]
+    assert files == [path.replace("contactfpga_core", "chest") for path in (*CORE, "vectors.hex", "example.v",
+                     "contactfpga_core.sdc", "README.md")]  # fmt: skip
+    assert not any("contactfpga_core" in (tmp_path / file).read_text() for file in files)
+    for name in (*CORE[:2], "example.v"):
+        shutil.copy(written("raster") / name, tmp_path / f"other_{name}")
+    sources = "chest.v example.v other_contactfpga_core.v other_example.v"
+    asserted = "read_verilog -sv -formal chest_sva.sv other_contactfpga_core_sva.sv"
+    tops = "module both; chest_peripheral one (); contactfpga_core_peripheral other (); endmodule"
+    (tmp_path / "both.v").write_text(tops)
+    native.yosys(f"read_verilog {sources} both.v; {asserted}; hierarchy -check -top both", tmp_path)
+
+
+@pytest.mark.parametrize("name", ["logic", "", "a" * 65, "2nd", "a-b", "caf\u00e9"])
+def test_a_name_that_no_module_can_have_is_refused(run, tmp_path, name):
+    status, out, error = run("ip", "--name", name, "-o", tmp_path)
+    assert (status, out, error.count("\n")) == (1, "", 1)
+    assert f"--name is {name!r}; a module's name has up to 64 letters" in error
+    assert [*tmp_path.iterdir()] == []
 
 
 def verilated(folder, top, files, *options):
@@ -163,7 +193,7 @@ verilator = pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="
 @verilator
 @pytest.mark.parametrize("name", SKINS)
 def test_verilator_finds_nothing_to_warn_of(written, name):
-    for top, files in (("contactfpga_core_tb", CORE), ("contactfpga_peripheral", (CORE[0], "example.v"))):
+    for top, files in (("contactfpga_core_tb", CORE), ("contactfpga_core_peripheral", (CORE[0], "example.v"))):
         done = verilated(written(name), top, files, "--lint-only")
         assert (done.returncode, done.stderr) == (0, "")
 
@@ -193,6 +223,14 @@ def test_ports_are_all_named_and_explained_in_the_table(written, name):
     table = (written(name) / "README.md").read_text()
     declared = re.search(r"module contactfpga_core\((.*?)\)", (written(name) / CORE[0]).read_text())[1]
     assert {*re.findall(r"^\| `(\w+)`", table, re.MULTILINE)} == {*declared.split(", ")}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_table_says_what_the_fields_of_the_closing_word_mean(written, name):
+    text = (written(name) / "README.md").read_text()
+    (fields,) = re.findall(r"  - with `tlast`: (.*)", text)
+    assert re.findall(r"^    - `(\w+)`: \w", text, re.MULTILINE) == re.findall(r"`(\w+)`", fields)
+    assert "`time`: device time at the sample of the frame's first row, in us" in text
 
 
 def test_constraints_name_the_clock_and_what_comes_at_any_time(written):

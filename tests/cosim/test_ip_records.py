@@ -211,8 +211,8 @@ def test_the_exported_file_does_the_same_in_every_clock(tmp_path, name):
     played, _ = play(skin, 2, stalling(2))
     files = {
         "core.v": ip.verilog(skin),
-        "sva.sv": ip.assertions(skin, played.ports),
-        "tb.v": ip.testbench(played.ports, len(played.words)),
+        "sva.sv": ip.assertions(skin, played.ports, ip.NAME),
+        "tb.v": ip.testbench(played.ports, len(played.words), ip.NAME),
     }
     for file, text in files.items():
         (tmp_path / file).write_text(text)

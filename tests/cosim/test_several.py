@@ -7,6 +7,10 @@ import random
 import bench_several
 import numpy as np
 import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
+from amaranth.sim import Simulator
 from slow_skin import SHEETS, two_sheets
 
 import contactfpga
@@ -14,7 +18,9 @@ from contactfpga import Skin, examples
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
+from contactfpga_hdl import several as gateware
 from contactfpga_hdl.several import RoundRobin
+from contactfpga_hdl.top import _SHARED_LINE
 from contactfpga_sim.model.board.compiled import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
@@ -99,6 +105,37 @@ def test_gateware_and_model_agree_with_requests_as_pulses():
         assert talk.stats.frames > 1
         assert talk.stats.damaged.total() == talk.stats.lost == 0
     assert one.stats.overwritten + other.stats.overwritten > 0
+
+
+def test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant(monkeypatch):
+    """Sheets with nothing behind their ports towards the shared line."""
+
+    class Sheet(wiring.Component):
+        def __init__(self, skin, probes, place):
+            super().__init__({**_SHARED_LINE, "contact": Out(1)})
+
+        def elaborate(self, platform):
+            return Module()
+
+    monkeypatch.setattr(gateware, "Top", Sheet)
+    top = gateware.SeveralTop(Several(SMALL.skins * 8))
+
+    async def bench(ctx):
+        for sheet in top.sheets:
+            ctx.set(sheet.contact, 1)
+            ctx.set(sheet.holds, 1)
+            await ctx.tick().repeat(20)
+            assert ctx.get(top.contact)
+            assert [other is sheet for other in top.sheets] == [ctx.get(other.grant) for other in top.sheets]
+            ctx.set(sheet.contact, 0)
+            ctx.set(sheet.holds, 0)
+            await ctx.tick()
+            assert not ctx.get(top.contact)
+
+    simulator = Simulator(top)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
 
 
 def test_a_fault_of_the_grants_is_seen(monkeypatch):

@@ -274,3 +274,31 @@ def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng
         passed = 0 if decide[cycle] and sends else passed + toggled[cycle]
     assert most > 2
     assert 100 < sum(due.values) < cycles - 100
+
+
+def test_readings_go_after_each_four_frames_that_follow_one_another(bench):
+    """Frames and readings wait at all times."""
+    dut = link_module.Link(Skin(units=1))
+    sim = bench(dut)
+    sim.drive(dut.units.due, lambda cycle: 1)
+    sim.drive(dut.frames.commit, lambda cycle: int(cycle % 4 == 0))
+    sim.sink(dut.bytes)
+    taken, frames = sim.watch(dut.units.taken), sim.watch(dut.frames.verdict.sequence)
+    sim.run(1_000)
+    sent = [frames[cycle] for cycle, level in enumerate(taken.values) if level]
+    assert sent == list(range(4, 4 * len(sent) + 1, 4))
+    assert len(sent) > 4
+
+
+def test_carries_that_come_in_one_clock_are_both_counted(bench):
+    """Those of the frames sent and of the epoch, through a carry into a second digit."""
+    dut, count = odometer.Odometer(), 130
+    sim = bench(dut)
+    for pulses in (dut.sent, dut.epoch):
+        sim.drive(pulses, lambda cycle: int(40 <= cycle < 40 * (count + 1) and cycle % 40 == 0))
+    sim.drive(dut.place, lambda cycle: cycle % 16)
+    digit = sim.watch(dut.digit)
+    sim.run(40 * (count + 3))
+    at = 16 * (40 * (count + 2) // 16)
+    state = [digit[at + 1 + place] for place in range(11)]
+    assert state == [0, 0, count % 128, count // 128, 0, 0, 0, count % 128, count // 128, 0, 0]

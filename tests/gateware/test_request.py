@@ -1,9 +1,11 @@
 """What the board takes for a request or a command among the bytes it receives."""
 
+from functools import partial
+
 import pytest
 from cobs import cobs
 from listener import IDLE, Listener, give_bits
-from wire import check, line
+from wire import check, crc16, line
 
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver
@@ -29,22 +31,22 @@ def listen(bench):
 
 @pytest.fixture(scope="module")
 def obey(bench):
+    """:func:`obeyed` by a board that serves one sheet."""
+    dut = RequestReader(commands=True)
+    return partial(obeyed, dut, bench(dut))
+
+
+def obeyed(dut, sim, data, broken=None):
     """(number, hello, command) of all that a board takes that obeys, in bytes whose bits come one per clock; command:
     (what, value) or None; ``broken``: the place of the one byte that has no stop bit."""
-    dut = RequestReader(commands=True)
-    sim = bench(dut)
-
-    def obey(data, broken=None):
-        events = []  # level, bit, index, good, bad
-        for at, byte in enumerate(data):
-            stop = (0, 0, 0, 0, 1) if at == broken else (1, 0, 0, 1, 0)
-            events += [*((byte >> index & 1, 1, index, 0, 0) for index in range(8)), stop]
-        cycles = give_bits(sim, dut.bits, events)
-        seen = {name: sim.watch(getattr(dut, name)) for name in OUTPUTS}
-        sim.run(cycles)
-        return [one[1:] for one in taken(seen)]
-
-    return obey
+    events = []  # level, bit, index, good, bad
+    for at, byte in enumerate(data):
+        stop = (0, 0, 0, 0, 1) if at == broken else (1, 0, 0, 1, 0)
+        events += [*((byte >> index & 1, 1, index, 0, 0) for index in range(8)), stop]
+    cycles = give_bits(sim, dut.bits, events)
+    seen = {name: sim.watch(getattr(dut, name)) for name in OUTPUTS}
+    sim.run(cycles)
+    return [one[1:] for one in taken(seen)]
 
 
 OUTPUTS = ("received", "hello", "number", "heard", "command", "what", "value")
@@ -124,9 +126,6 @@ def test_the_number_is_gone_from_the_first_bit_of_the_next_packets(listen):
 @pytest.mark.parametrize(
     "data",
     [
-        sealed(plain(9, kind=4)),
-        sealed(plain(9, kind=6)),
-        sealed(plain(9, kind=13)),
         sealed(plain(9) + b"\x51"),
         sealed(plain(9)[1:]),
         sealed(b"\x81" + plain(9)),
@@ -220,12 +219,9 @@ def test_a_board_without_commands_ignores_them(bench):
 @pytest.mark.parametrize(
     "data",
     [
-        sealed(order(9, 1, kind=5)),
-        sealed(order(9, 1, kind=11)),
         sealed(order(9, 1)[1:]),
         sealed(b"\x81" + order(9, 1)),
         sealed(order(9, 1) + b"\xa1"),
-        sealed(plain(9, kind=10)),
         sealed(order(9, 1))[:-2] + b"\0",
     ],
 )
@@ -243,6 +239,36 @@ def test_no_flip_of_a_bit_makes_another_command(obey):
     found = obey(data + b"\0")
     assert set(found) == {(0x12345 | 1, True, (1, 0x54321))}
     assert len(found) == 1 + 1 + 6
+
+
+def test_each_bit_that_a_wrong_check_leaves_counts(obey):
+    """Checks that leave one bit of 16, found by running the CRC backward."""
+    stuffed, data = cobs.encode(plain(9)), b"\0"
+    for bit in range(16):
+        wrong = 1 << bit
+        for _ in range(16):
+            wrong = (wrong << 1 ^ 0x10811 * (wrong >> 15)) & 0xFFFF
+        pieces = crc16(stuffed) ^ wrong
+        data += stuffed + bytes(0x80 | pieces >> shift & 0x7F for shift in (0, 7, 14)) + b"\0"
+    assert obey(data + sealed(plain(10))) == [(10, False, None)]
+
+
+def test_no_other_kind_is_taken(obey):
+    kinds = [sealed(plain(9, kind=kind)) + sealed(order(10, 1, 5, kind=kind)) for kind in range(16)]
+    assert obey(b"\0" + b"".join(kinds)) == [(9, False, None), (10, False, (1, 5))]
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("sheet", [5, 10])
+def test_a_sheet_of_several_takes_what_has_its_number_in_every_bit(bench, sheet):
+    """Each bit of the two bytes that tell the sheet is wrong once, with a check that is right."""
+    dut = RequestReader(commands=True, sheet=sheet)
+    packets = []
+    for wrong in [1 << bit for bit in range(16)] + [0]:
+        for whole in (plain(9, True), order(10, 127, 77)):
+            numbered = cobs.encode(whole) + (0xB002 + (sheet << 8) ^ wrong).to_bytes(2, "little")
+            packets.append(numbered + check(numbered) + b"\0")
+    assert obeyed(dut, bench(dut), b"\0" + b"".join(packets)) == [(9, True, None), (10, False, (127, 77))]
 
 
 @pytest.mark.slow

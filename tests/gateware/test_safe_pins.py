@@ -8,7 +8,7 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.link.alive import Alive
-from contactfpga_hdl.scan import raster
+from contactfpga_hdl.scan import raster, reversal
 from contactfpga_sim.model.golden import Timeline, guard, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Cuts
@@ -24,12 +24,13 @@ SKINS = {
     "guarded": GUARDED,
     "no guard lines": Skin(**FIELDS),
     "adaptive": Skin(**FIELDS | {"scan": "adaptive", "release_us": 8}),
+    "reversal": Skin(**FIELDS | {"scan": "reversal", "settle_us": 2, "precharge_us": 1, "project_us": 2}),
     "slow frames": Skin(**FIELDS | {"settle_us": 700, "fail_safe": False}, guard=True),
 }
 NOTHING = np.zeros((2, 2), bool)
 
 
-def events(skin: Skin, cycles: int, pause: int = 1_500) -> Timeline:
+def events(skin: Skin, cycles: int, pause: int) -> Timeline:
     """Now and then a touch, a stuck column or a cut line, for a time around a tick of the alive pin."""
     rng = np.random.default_rng(skin.guard + 2 * (skin.scan == "raster"))
     pieces, cuts, start = [(0, NOTHING, None)], [(0, Cuts())], 50
@@ -56,13 +57,16 @@ def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
     assert len(expected.contact) > 5
 
 
-@pytest.mark.parametrize("name", sample(SKINS, quick=["adaptive"]))
+@pytest.mark.whole
+@pytest.mark.parametrize("name", sample(SKINS, quick=["guarded", "adaptive", "reversal"]))
 def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
     """What is told of lines is renewed every 512 us."""
-    monkeypatch.setattr(raster, "RETRY_BIT", 9)
+    for scan in (raster, reversal):
+        monkeypatch.setattr(scan, "RETRY_BIT", 9)
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
     skin = SKINS[name]
-    cycles, pause = (20_000, 9_000) if name == "slow frames" else (5_000, 1_500)
+    cycles = 20_000 if name == "slow frames" else 5_000
+    pause = {"slow frames": 9_000, "guarded": 700}.get(name, 1_500)
     timeline = events(skin, cycles, pause)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 20

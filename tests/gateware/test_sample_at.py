@@ -64,7 +64,7 @@ def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
     values = [0, 1, 2, 3, known.first_sample, known.settle - 1, known.settle, known.settle + 1, (1 << 21) - 1, 5 << 14]
     for number in itertools.count(129 * 128 + 1):
         value = int(rng.choice([*values, *rng.integers(known.first_sample, known.settle, size=10)]))
-        what = int(rng.choice([2, 2, 2, 2, 1, 3]))
+        what = int(rng.choice([2, 2, 2, 2, 1, 3, 64 | 2]))
         if not received:
             what, value = 2, known.first_sample
         data = command(number, what, value, False, known.bit_clocks)
@@ -108,7 +108,7 @@ def test_a_frame_takes_the_last_clock_that_was_asked_for_before_it_begins(bench,
     skin, cycles = SKINS["direct"], 3_000
     settle, first = facts(skin).settle, facts(skin).first_sample
     values = [
-        rng.choice([rng.randrange(settle + 3), rng.randrange(1 << 21), settle, settle - 1]) for _ in range(cycles)
+        rng.choice([rng.randrange(settle + 3), rng.randrange(1 << 21), settle, settle - 1 | 1 << 20]) for _ in range(cycles)
     ]
     moves, begins = ([int(rng.random() < 0.3) for _ in range(cycles)] for _ in range(2))
     dut = Alone(skin)

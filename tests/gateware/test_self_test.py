@@ -30,7 +30,8 @@ def asked(skin: Skin, rng, cycles: int) -> list[tuple[int, bytes]]:
     while cycle < cycles:
         kind = rng.random()
         if kind < 0.75:
-            data = command(number, 1 if kind < 0.65 else rng.choice([2, 3]), 0, kind < 0.1, bit_clocks)
+            what = 1 if kind < 0.65 else rng.choice([2, 3])
+            data = command(number, what if sent else 64 | 1, 0, kind < 0.1, bit_clocks)
         else:
             data = request(number, kind < 0.8, bit_clocks)
         sent.append((cycle, data))

@@ -7,10 +7,13 @@ import time
 
 import pytest
 from amaranth.back import rtlil
+from amaranth.hdl import Fragment
+from amaranth.sim import Simulator
 from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.top import Top
+from contactfpga_sim.verify.proofs.inside import Inside
 
 SKINS = {
     "reference": {},
@@ -115,3 +118,37 @@ def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, de
         word = int.from_bytes(packet[-size:-1], "little")
         number = (word >> 24 & 255) + (word >> counted)  # frames sent and frames overwritten before it
         assert word & 0xFFFFFF == (number * clocks * rows + clocks) // 12
+
+
+WATCHED = (
+    "scan.frame_clock.time", "scan.following", "scan.driver.selected", "link.filling", "link.waiting", "link.sending",
+)  # fmt: skip
+
+
+def test_a_register_that_turns_by_itself_starts_all_but_the_transmitter_anew():
+    """Two clocks later each of their registers has the value that it has at power-up, and then ``contact`` is high with
+    ``fail_safe``."""
+    top = Top(Skin(rows=2, columns=3, settle_us=3.0, fail_safe=True))
+    fragment = Fragment.get(top, None)
+    parts = [Inside(part) for part, name, _ in fragment.subfragments if name != "transmitter"]
+    registers = [one for part in parts for one in part.registers() if not one.reset_less]
+    seen = {name: [] for name in WATCHED}
+
+    async def bench(ctx):
+        ctx.set(top.columns, 0b111)
+        fresh = [ctx.get(one) for one in registers]
+        for name in WATCHED:
+            await ctx.tick().repeat(200)
+            wrong = Inside(fragment)[name]
+            ctx.set(wrong, ctx.get(wrong) ^ 2)
+            for clocks in (2, 1, 1):
+                seen[name].append(([ctx.get(one) for one in registers] == fresh, ctx.get(top.contact)))
+                await ctx.tick().repeat(clocks)
+
+    simulator = Simulator(fragment)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    for (before, low), (anew, still_low), (_, high) in seen.values():
+        assert (before, anew) == (False, True)
+        assert (low, still_low, high) == (0, 0, 1)

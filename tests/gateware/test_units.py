@@ -61,9 +61,9 @@ def readings(rng, skin, cycles):
 
 def setting(rng, skin):
     """(what, value) of a command that some readings reach, now and then of a unit or a sum that is not there."""
-    what = rng.choice([ZERO, THRESHOLD, THRESHOLD, SUM_THRESHOLD, SUM_THRESHOLD, 1])
+    what = rng.choice([ZERO, THRESHOLD, THRESHOLD, SUM_THRESHOLD, SUM_THRESHOLD, 1, 64 | THRESHOLD])
     number = rng.choice([0, rng.randrange(4096), rng.randrange(2**18)])
-    return what, rng.randrange(max(skin.units, len(skin.unit_sums)) + 1) % 8 | number << 3
+    return what, rng.choice([rng.randrange(max(skin.units, len(skin.unit_sums))), rng.randrange(8)]) | number << 3
 
 
 class Inputs:
@@ -83,7 +83,8 @@ class Inputs:
         pass
 
 
-@pytest.mark.parametrize("name", sample(SKINS, quick=["sums", "fail safe", "guard"]))
+@pytest.mark.whole
+@pytest.mark.parametrize("name", sample(SKINS, quick=["fail safe", "guard"]))
 def test_board_does_what_the_golden_model_says(name, monkeypatch):
     """With guard lines for longer than the first hello. What is told of them is renewed every 256 us, so that reports
     and readings wait together."""
@@ -125,7 +126,7 @@ def test_readings_and_thresholds_are_the_golden_models_in_every_clock(bench, rng
     assert changes(over.values) == [one for one in expected.over if one[0] < cycles]
     assert changes(armed.values) == [one for one in expected.armed if one[0] < cycles]
     assert due.values.index(1) == expected.packets[0][0]
-    assert len(expected.over) > 4
+    assert len(expected.over) > 2
 
 
 def changes(levels):

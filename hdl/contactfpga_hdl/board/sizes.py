@@ -108,7 +108,12 @@ def measure_netlists(
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    return _packed(_rtlil(component()), device)[0]
+    return counts(component, device)[0]
+
+
+def counts(component: Callable[[], wiring.Component], device: Device) -> list[int]:
+    """LUT4, flip-flops and block RAMs, without place and route."""
+    return _packed(_rtlil(component()), device)
 
 
 def _rtlil(design: Elaboratable) -> str:

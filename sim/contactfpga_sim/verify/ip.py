@@ -19,6 +19,7 @@ from amaranth.sim import Simulator
 from contactfpga import __version__
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
+from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin
 from contactfpga_hdl.core import BYTES, RECORDS, Core
 from contactfpga_hdl.link.records import closing_layout, word_bits
@@ -28,6 +29,8 @@ from contactfpga_sim.model.golden.trace import Timeline
 from contactfpga_sim.verify.cosim.record import InputDriver
 
 NAME = "contactfpga_core"
+"""Of the module, and the beginning of all other modules' names, if no other is given."""
+MOST_LETTERS = 64
 SCANS = 4
 """Scans in the vectors after the hello."""
 RESET = 4
@@ -36,35 +39,39 @@ MOST_CLOCKS = 100_000
 """Most clocks of vectors: a minute or two in Amaranth's simulator."""
 
 # As Amaranth does for its own Verilog: processes stay processes, so that conditions can be read.
-_VERILOG = f"""read_rtlil core.il
-rename top {NAME}
+_VERILOG = """read_rtlil core.il
 proc -nomux -norom
 memory_collect
 write_verilog -norename -noattr core.v"""
 
+_SYNCHRONIZED = "two registers synchronize it inside"
 MEANINGS = {
     "clk": "clock; times of the sheet hold at {clock_hz:,} Hz",
     "rst": "synchronous reset, high; hold it for 4 clocks. Then the core is as at power-up",
     "rows": "to the rows of the sheet",
-    "columns": "from the columns of the sheet; two registers synchronize them inside",
+    "columns": f"from the columns of the sheet; {_SYNCHRONIZED}",
     "row_data": "to the data pins of the rows' shift registers",
     "row_clock": "to their clock",
     "row_latch": "to their latch",
     "row_enable_n": "to their output enable, low",
-    "column_data": "from the data pins of the columns' shift registers",
+    "column_data": f"from the data pins of the columns' shift registers; {_SYNCHRONIZED}",
     "column_clock": "to their clock",
     "column_load_n": "to their parallel load, low",
     "rows_drive": "drive each row, else leave it to its resistor",
-    "rows_read": "from the rows of the sheet",
+    "rows_read": f"from the rows of the sheet; {_SYNCHRONIZED}",
     "columns_drive": "drive each column, else leave it to its resistor",
     "columns_level": "the level to which columns are driven",
-    "rx": "requests and commands as a UART at {baud:,} bits per second; hold it high if there are none",
+    "rx": (
+        "requests and commands as a UART at {baud:,} bits per second; hold it high if there are none; " + _SYNCHRONIZED
+    ),
     "contact": "high while something touches the sheet",
     "alive": "turns each millisecond while whole frames without a fault come",
     "spi_clock": "to the converter of the pressure units",
     "spi_select_n": "to its select, low",
     "spi_mosi": "to its data input",
-    "spi_miso": "from its data output",
+    "spi_miso": f"from its data output; {_SYNCHRONIZED}",
+    "spi_ready_n": f"from its ready output, low; {_SYNCHRONIZED}",
+    "spi_pace": "to its clock input, from which it takes its pace",
     "m_axis_tdata": "a byte of a packet",
     "m_axis_tvalid": "there is one",
     "m_axis_tready": "it is taken; may be low for as long as you like",
@@ -73,6 +80,17 @@ MEANINGS = {
     "m_axis_records_tvalid": "there is one",
     "m_axis_records_tready": "it is taken; may be low for as long as you like",
     "m_axis_records_tlast": "it closes its frame",
+}
+
+CLOSING = {
+    "time": "device time at the sample of the frame's first row, in us",
+    "number": "frames before this one, modulo 65,536",
+    "cells": "pressed switches",
+    "zones": "zones on the sheet, including those without a record",
+    "overflow": "the sheet has more zones than the frame has records",
+    "mismatch": "the sums of the records differ from those of the cells: the gateware or a bit of it was wrong",
+    "fault": "a column read pressed while no row was driven, or another fault of a line is known",
+    "motion": "a row read touched as the frame began, and empty when it was driven: something moved during the frame",
 }
 
 
@@ -117,34 +135,46 @@ def closing_fields(skin: Skin) -> dict[str, int]:
     return {name: len(Signal(shape)) for name, shape in closing_layout(skin.derived).members.items()}
 
 
-def write(skin: Skin, folder: Path) -> list[Path]:
-    """Write all files of the core into an existing folder.
+def write(skin: Skin, folder: Path, name: str = NAME) -> list[Path]:
+    """Write all files of the core into an existing folder; the names of all modules begin with ``name``.
 
-    Raises :class:`IpError` if the Skin has no core.
+    Raises :class:`IpError` if the Skin has no core, or if Verilog has no module of this name.
     """
     if skin.dual:
         raise IpError("dual = true compares two copies at the transmit pin, which a core has not; leave it out")
+    text = verilog(skin, name)
     core = Core(skin)
     known = ports(skin, core)
     played = vectors(skin, core, known)
     texts = {
-        f"{NAME}.v": _head(skin) + verilog(skin),
-        f"{NAME}_sva.sv": assertions(skin, known),
-        f"{NAME}_tb.v": testbench(known, len(played)),
+        f"{name}.v": _head(skin) + text,
+        f"{name}_sva.sv": assertions(skin, known, name),
+        f"{name}_tb.v": testbench(known, len(played), name),
         "vectors.hex": "".join(f"{word:x}\n" for word in played),
-        "example.v": example(skin, known),
-        f"{NAME}.sdc": constraints(skin, known),
-        "README.md": readme(skin, known),
+        "example.v": example(skin, known, name),
+        f"{name}.sdc": constraints(skin, known),
+        "README.md": readme(skin, known, name),
     }
-    for name, text in texts.items():
-        write_text(folder / name, text)
-    return [folder / name for name in texts]
+    for file, content in texts.items():
+        write_text(folder / file, content)
+    return [folder / file for file in texts]
 
 
-def verilog(skin: Skin) -> str:
-    """The core as Verilog-2005."""
+def verilog(skin: Skin, name: str = NAME) -> str:
+    """The core as Verilog-2005; raises :class:`IpError` as :func:`write` does."""
+    named = re.fullmatch(rf"[A-Za-z_]\w{{0,{MOST_LETTERS - 1}}}", name, re.ASCII)
+    text = _converted(Core(skin), name) if named else ""
+    if f"module {name}(" not in text:  # Yosys escapes the keywords of Verilog
+        raise IpError(
+            f"--name is {shown(name)}; a module's name has up to {MOST_LETTERS} letters, digits and underscores, does "
+            "not begin with a digit, and is no keyword of Verilog"
+        )
+    return text
+
+
+def _converted(core: Core, name: str) -> str:
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as work:
-        (Path(work) / "core.il").write_text(native.rtlil(Core(skin)))
+        (Path(work) / "core.il").write_text(native.rtlil(core, name=name))
         native.yosys(_VERILOG, Path(work))
         return _started((Path(work) / "core.v").read_text())
 
@@ -154,7 +184,7 @@ def _started(text: str) -> str:
 
     They compute a block once something in it changes, so each block gets a signal that changes once.
     """
-    text = re.sub(r"^  wire \[-1:0\] \S+ ;\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^  wire \[-1:0\] \S+ ?;\n", "", text, flags=re.MULTILINE)
     modules = [_triggered(module) for module in re.split(r"(?<=^endmodule\n)", text, flags=re.MULTILINE)]
     return re.sub(r"^(  reg (?:\[\d+:0\] )?_\d+_);$", r"\1 = 0;", "".join(modules), flags=re.MULTILINE)
 
@@ -240,7 +270,7 @@ def _signal(core: Core, clock_domain: ClockDomain, port: Port) -> Any:
     return clock_domain.rst if port.name == "rst" else getattr(core, port.name)
 
 
-def assertions(skin: Skin, known: list[Port]) -> str:
+def assertions(skin: Skin, known: list[Port], name: str) -> str:
     """Invariants at the pins, as immediate assertions for Yosys, Verilator and Icarus."""
     declared = ",\n".join(f"    input wire {port.range}{port.name}" for port in known)
     rows = "~rows" if skin.selects_low else "rows"
@@ -250,9 +280,9 @@ def assertions(skin: Skin, known: list[Port]) -> str:
         if skin.row_drive == "direct" and skin.scan == "raster" and not skin.self_test
         else ""
     )
-    return f"""// What holds at the pins of {NAME} in every clock. Instantiate it beside the core with the same wires.
+    return f"""// What holds at the pins of {name} in every clock. Instantiate it beside the core with the same wires.
 `timescale 1ns / 1ps
-module {NAME}_sva (
+module {name}_sva (
 {declared}
 );
 {_of_records(skin)}    reg waited = 0;
@@ -305,7 +335,7 @@ def _of_records(skin: Skin) -> str:
 """
 
 
-def testbench(known: list[Port], clocks: int) -> str:
+def testbench(known: list[Port], clocks: int, name: str) -> str:
     """A testbench that plays the vectors and compares all outputs in every clock."""
     inside = known[1:]
     takes, gives = ([port for port in inside if port.takes is taken] for taken in (True, False))
@@ -314,7 +344,7 @@ def testbench(known: list[Port], clocks: int) -> str:
     wires = "\n".join(f"    wire {port.range}{port.name};" for port in inside)
     return f"""// Plays vectors.hex, one word per clock, and compares each output: run it in the folder of that file.
 `timescale 1ns / 1ps
-module {NAME}_tb;
+module {name}_tb;
     reg clk = 0;
     reg [{wide + out - 1}:0] vectors [0:{clocks - 1}];
     reg [{wide - 1}:0] inputs = 0;
@@ -322,8 +352,8 @@ module {NAME}_tb;
 {wires}
     assign {{{", ".join(port.name for port in reversed(takes))}}} = inputs;
     assign outputs = {{{", ".join(port.name for port in reversed(gives))}}};
-    {NAME} core ({connected});
-    {NAME}_sva sva ({connected});
+    {name} core ({connected});
+    {name}_sva sva ({connected});
 
     integer i, wrong = 0;
     initial begin
@@ -346,7 +376,7 @@ endmodule
 """
 
 
-def example(skin: Skin, known: list[Port]) -> str:
+def example(skin: Skin, known: list[Port], name: str) -> str:
     """A peripheral of a small bus, with the core inside."""
     told = ("rx", "contact")
     sheet = [port for port in known[2:] if not port.name.startswith(BYTES) and port.name not in told]
@@ -359,7 +389,7 @@ def example(skin: Skin, known: list[Port]) -> str:
 // bits of the word, lowest first; a read of register {last} takes it. README.md has the fields. The interrupt is
 // high while a word waits: read words up to a closing one, then the frame is whole.
 `timescale 1ns / 1ps
-module contactfpga_peripheral (
+module {name}_peripheral (
     input wire clk,
     input wire rst,
     input wire select,
@@ -378,7 +408,7 @@ module contactfpga_peripheral (
 
     always @(posedge clk) if (select & read) data <= registers[32 * address +: 32];
 
-    {NAME} core (
+    {name} core (
         .clk(clk), .rst(rst), .rx(rx), .contact(contact), {connected},
         .{BYTES}_tdata(), .{BYTES}_tvalid(), .{BYTES}_tready(1'b0), .{BYTES}_tlast(),
         .{RECORDS}_tdata(tdata), .{RECORDS}_tvalid(irq), .{RECORDS}_tready(taken), .{RECORDS}_tlast(tlast)
@@ -402,7 +432,18 @@ def _fields(fields: dict[str, int]) -> str:
     return ", ".join(f"`{name}` [{high}:{low}]" if high > low else f"`{name}` [{low}]" for name, low, high in there)
 
 
-def readme(skin: Skin, known: list[Port]) -> str:
+def _place(skin: Skin) -> str:
+    """Where a record's cells are."""
+    if not skin.derived.report.zones:
+        return "bit c of a frame's record r is the switch in row r and column c"
+    if skin.derived.report.divided:
+        return f"x and y are in steps of 1/{2**skin.barycenter_bits} of a column and of a row, from the first on"
+    closed = "(sum_x + columns * turned) / area, modulo the columns (docs/protocol.md has rings)"
+    sums = closed if skin.closed else "sum_x / area"
+    return f"a zone is at x = {sums}, and y = sum_y / area, in columns and rows from the first one, 0, on"
+
+
+def readme(skin: Skin, known: list[Port], name: str) -> str:
     """Ports, settings, and how to try the core."""
     rows = "".join(
         f"| `{port.name}` | {'in' if port.takes else 'out'} | {port.bits} | {port.meaning} |\n" for port in known
@@ -410,7 +451,8 @@ def readme(skin: Skin, known: list[Port]) -> str:
     settings = "".join(f"    {line}\n" for line in skin.to_toml().splitlines())
     scan = skin.derived.frame_clocks
     record, closing = (_fields(fields) for fields in (record_fields(skin), closing_fields(skin)))
-    return f"""# {NAME}
+    meanings = "".join(f"    - `{field}`: {CLOSING[field]}\n" for field, bits in closing_fields(skin).items() if bits)
+    return f"""# {name}
 
 contactfpga {__version__} for {skin.rows}x{skin.columns} switches, as Verilog-2005 without primitives of a vendor.
 One clock, synchronous reset.
@@ -426,15 +468,18 @@ One clock, synchronous reset.
   hello, which says the size of the sheet. If a frame is ready while an older one waits, it takes its place.
 - `m_axis_records` has the same frames as words: records, at most {skin.derived.max_items:,}, then one with `tlast`.
   - record: {record}
+  - {_place(skin)}
   - with `tlast`: {closing}
-- A frame is offered when it is whole. If one waits and the first record of the next one comes, that takes its place:
-  `number` counts replaced frames, too, so a gap of n says that n are missing.
+{meanings}- A frame is offered when it is whole. If one waits and the first word of the next one comes, that takes its
+  place: `number` counts replaced frames, too, so a gap of n says that the reader missed n. With `send = "on_change"`
+  a scan that replaces a frame counts although nothing has changed, so a slow reader may miss many more frames than a
+  prompt one gets.
 
-    iverilog -g2012 -o tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v && ./tb
-    verilator --binary --assert -CFLAGS -std=c++20 --top {NAME}_tb {NAME}.v {NAME}_sva.sv {NAME}_tb.v
-    ./obj_dir/V{NAME}_tb
+    iverilog -g2012 -o tb {name}.v {name}_sva.sv {name}_tb.v && ./tb
+    verilator --binary --assert -CFLAGS -std=c++20 --top {name}_tb {name}.v {name}_sva.sv {name}_tb.v
+    ./obj_dir/V{name}_tb
 
-`example.v` is a peripheral with the core inside, `{NAME}.sdc` has the clock. The settings, to make it again with
-`contactfpga ip --skin FILE`:
+`example.v` is a peripheral with the core inside, `{name}.sdc` has the clock. The settings, to make it again with
+`contactfpga ip --skin FILE --name {name}`:
 
 {settings}"""

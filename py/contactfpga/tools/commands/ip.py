@@ -13,6 +13,12 @@ EXTRA = "sim"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.sheet(parser, "Skin of the core (default: the reference Skin).")
+    parser.add_argument(
+        "--name",
+        default="contactfpga_core",
+        metavar="NAME",
+        help="Module, and beginning of the names of all other modules (default: %(default)s).",
+    )
     flags.output_folder(parser, "build/ip")
 
 
@@ -20,6 +26,6 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.verify import ip
 
     file = flags.sheet_file(args)
-    for path in ip.write(Skin.load(file) if file else Skin(), outputs.folder(args.output)):
+    for path in ip.write(Skin.load(file) if file else Skin(), outputs.folder(args.output), args.name):
         terminal.say(str(path))
     return 0

@@ -207,14 +207,15 @@ def _write(design: Any, folder: Path) -> str:
     return "read_rtlil model.il"
 
 
-def rtlil(component: Any, sources: bool = False) -> str:
-    """RTLIL of an Amaranth component; ``sources`` adds source places."""
+def rtlil(component: Any, sources: bool = False, name: str = "top") -> str:
+    """RTLIL of an Amaranth component; ``sources`` adds source places, and the names of its modules begin with
+    ``name``."""
     try:
         from amaranth.back import rtlil as back
     except ImportError:
         raise MissingExtra(_USER, "sim") from None
     # Source positions would make a moved checkout another design.
-    return back.convert(component, name="top", emit_src=sources)
+    return back.convert(component, name=name, emit_src=sources)
 
 
 def yosys(commands: str, folder: Path) -> None:
