@@ -108,7 +108,7 @@ def test_gateware_and_model_agree_with_requests_as_pulses():
 
 
 def test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant(monkeypatch):
-    """Sheets with nothing behind their ports towards the shared line."""
+    """Sheets with nothing behind their ports at the shared line."""
 
     class Sheet(wiring.Component):
         def __init__(self, skin, probes, place):

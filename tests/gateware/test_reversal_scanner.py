@@ -173,13 +173,13 @@ def check_pins(life: Life) -> None:
 
 
 CYCLES = 1500
-SHORT = {"debounce_press_us": 1.0, "debounce_release_us": 1.0}
 STALLS = [
     {"rows": 5, "columns": 3, "mask": ((1, 1), (4, 0))},
     {"rows": 4, "columns": 2, "report": "cells", "diodes": "row2col"},
     {"rows": 6, "columns": 1, "diodes": "row2col", "precharge_us": 0.25},
-    {"rows": 4, "columns": 3, "mask": ((1, 1), (3, 0)), "debounce": "sym_defer_pk", **SHORT},
-]
+    {"rows": 4, "columns": 3, "mask": ((1, 1), (3, 0)), "debounce": "sym_defer_pk", "debounce_press_us": 1.0,
+     "debounce_release_us": 1.0},
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("fields", STALLS, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
