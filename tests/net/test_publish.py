@@ -106,9 +106,7 @@ def pass_on(streaming):
 
 @pytest.mark.slow
 def test_a_killed_publisher_is_lost_and_not_found_again(streaming, endpoint, monkeypatch):
-    monkeypatch.setattr(
-        net_port, "GONE_S", LONG / 3
-    )  # a busy machine lets one that lives be silent for longer than 1 s
+    monkeypatch.setattr(net_port, "GONE_S", LONG / 3)  # a busy machine lets who lives be silent, too
     with router(endpoint):
         with publish(streaming.path, "--connect", endpoint) as publisher:
             with contactfpga.open(publisher.line, timeout=LONG) as board:
