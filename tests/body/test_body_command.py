@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 import contactfpga
 from contactfpga.robot.body import Body, OpenBody, Snapshot
 from contactfpga.tools import cli
+from contactfpga.tools.commands.body import show
 from contactfpga.zones.units import UnitSamples
 
 UNITS = contactfpga.examples() / "units.toml"
@@ -88,11 +89,13 @@ def test_command_waits_for_the_readings_that_belong_to_a_frame(robot, capsys, mo
     units = body.links["chest"].units
     readings = units.zeros + np.linalg.pinv(units.matrix) @ exerted
 
-    def read(self, timeout):
-        come = UnitSamples(0, tuple(readings.tolist()), (0.0,) * 6, (False,) * 6)
-        threading.Timer(0.005, lambda: setattr(states["chest"].zones, "_units", come)).start()
-        return Snapshot(body, 10.0, states)
+    come = UnitSamples(0, tuple(readings.tolist()), (0.0,) * 6, (False,) * 6)
 
-    monkeypatch.setattr(OpenBody, "read", read)
+    def sleep(seconds):
+        if seconds > 0.005:
+            states["chest"].zones._units = come
+
+    monkeypatch.setattr(OpenBody, "read", lambda self, timeout: Snapshot(body, 10.0, states))
+    monkeypatch.setattr(show, "time", SimpleNamespace(sleep=sleep, monotonic=lambda: 0.0))
     assert cli.main(["body", str(robot), "--frame", "link", "--timeout", "0.2"]) == 0
     assert "mm2, pushes 4.00 N" in capsys.readouterr().out

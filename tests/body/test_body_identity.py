@@ -12,7 +12,8 @@ from contactfpga.robot.body import Body, OpenBody
 from contactfpga.robot.body.plan import read
 
 LEFT, RIGHT = FLAT.replace(name="LEFT"), FLAT.replace(name="RIGHT")
-PATIENT = {"late_s": 5.0, "silent_s": 7.0}
+PATIENT = {"late_s": 60.0, "silent_s": 90.0}
+LONG = 60.0
 
 
 def body_of(folder, links):
@@ -35,7 +36,7 @@ def test_boards_that_changed_places_are_a_mismatch(tmp_path):
     body = body_of(tmp_path, {"left": ("a", LEFT), "right": ("b", RIGHT)})
     world = plugged(a=LEFT, b=RIGHT)
     with OpenBody(body, opened=world.opened) as opened:
-        assert opened.read(10.0).answering == ("left", "right")
+        assert opened.read(LONG).answering == ("left", "right")
         for port, skin in (("a", RIGHT), ("b", LEFT)):
             gone, world.ports[port] = world.ports[port], Streaming(skin)
             gone.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("unplugged"))
@@ -50,7 +51,7 @@ def test_boards_that_changed_places_are_a_mismatch(tmp_path):
 def test_a_board_that_is_flashed_with_another_name_is_a_mismatch(tmp_path):
     world = plugged(a=LEFT)
     with OpenBody(body_of(tmp_path, {"left": ("a", LEFT)}), opened=world.opened) as opened:
-        assert opened.read(10.0).answering == ("left",)
+        assert opened.read(LONG).answering == ("left",)
         board = world.ports["a"]
         board.__init__(RIGHT)
         board._out = board.hello()
@@ -61,7 +62,7 @@ def test_a_board_that_is_flashed_with_another_name_is_a_mismatch(tmp_path):
 def test_names_that_nobody_gave_are_none(tmp_path, skins):
     mine, theirs = skins
     with OpenBody(body_of(tmp_path, {"left": ("a", mine)}), opened=plugged(a=theirs).opened) as opened:
-        assert opened.read(10.0).answering == ("left",)
+        assert opened.read(LONG).answering == ("left",)
 
 
 def test_two_robots_of_the_same_skins_keep_to_their_own_boards(tmp_path):
@@ -76,7 +77,7 @@ def test_two_robots_of_the_same_skins_keep_to_their_own_boards(tmp_path):
         worlds.append(OpenBody(body, opened=world.opened))
     try:
         for robot in worlds:
-            contacts = robot.read(10.0).contacts("link")
+            contacts = robot.read(LONG).contacts("link")
             assert [one.link for one in contacts] == ["left", "right"]
             seen.append({one.zone.x_mm for one in contacts})
         assert seen == [{20.0}, {100.0}]

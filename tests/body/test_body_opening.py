@@ -14,44 +14,32 @@ from contactfpga.robot.body import Body, OpenBody
 
 @pytest.fixture
 def opened(tmp_path, monkeypatch):
-    """Which calls of ``contactfpga.open`` there were: (port, from, to)."""
+    """At each call of ``contactfpga.open``: the ports that are being opened, its own last."""
     (tmp_path / "skin.toml").write_text(FLAT.to_toml())
     ports = ["", "name:LEFT", "usb:1", "/dev/a", "/dev/b", "/dev/c"]
     links = [f'[[links]]\nname = "{number}"\nskin = "skin.toml"\n' for number in range(len(ports))]
     texts = [link + (f'port = "{port}"\n' if port else "") for link, port in zip(links, ports)]
     (tmp_path / "robot.toml").write_text("".join(texts))
-    calls, lock = [], threading.Lock()
+    calls, inside, lock = [], [], threading.Lock()
 
     def fails(port, *_, **__):
-        begun = time.monotonic()
+        with lock:
+            inside.append(port)
+            calls.append(tuple(inside))
         time.sleep(0.05)
         with lock:
-            calls.append((port, begun, time.monotonic()))
+            inside.remove(port)
         raise PortNotFound("it is not there")
 
     monkeypatch.setattr(driver, "open", fails)
     with OpenBody(Body.load(tmp_path / "robot.toml")):
-        wait_until(lambda: len(calls) >= 12)
+        # Ports that are named are opened together, so that one that does not answer delays no other one.
+        wait_until(lambda: len(calls) >= 12 and any(len(ports) > 1 for ports in calls))
     return calls
-
-
-def searched(call):
-    return call[0] is None or not call[0].startswith("/dev/")
-
-
-def apart(one, other):
-    return one[2] <= other[1] or other[2] <= one[1]
 
 
 def test_no_port_is_opened_while_boards_are_searched_for(opened):
     """It would be found taken, though nobody else has it."""
-    searches = [call for call in opened if searched(call)]
+    searches = [ports for ports in opened if any(port is None or not port.startswith("/dev/") for port in ports)]
     assert len(searches) >= 3
-    for search in searches:
-        assert all(call is search or apart(call, search) for call in opened)
-
-
-def test_ports_that_are_named_are_opened_together(opened):
-    """So that one that does not answer delays no other one."""
-    named = [call for call in opened if not searched(call)]
-    assert any(one is not other and not apart(one, other) for one in named for other in named)
+    assert {len(ports) for ports in searches} == {1}

@@ -20,7 +20,7 @@ from contactfpga_sim.lab import pool
 SOON_S = 2.0
 """Within which a command ends, on a machine with nothing else to do."""
 
-SLACK_S = 40.0
+SLACK_S = 58.0
 """What other work on this machine may add; what is interrupted would take longer."""
 
 SCENES = "examples/scenes-bumper.toml"

@@ -91,7 +91,7 @@ def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
     if ended:
         return
     assert_quiet(errors)
-    at_their_end = {0, 1, 2} if name in ("doctor", "plot", "cover") else {0} if name in RUNNING else set()
+    at_their_end = {0, 1, 2} if name in ("doctor", "plot", "cover") else {0}  # it may end just before the signal
     at_their_end |= {-number}  # Python takes its handlers away before it ends; a shell shows the same status
     assert process.returncode in {STATUSES[number]} | at_their_end, errors
 

@@ -5,17 +5,18 @@ import itertools
 import re
 import subprocess
 import sys
-import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fake_board import FakeBoard, patiently, wait_until
+from fake_board import FakeBoard, wait_until
 from rich.cells import cell_len
 from rich.console import Console
 from sample import sample
 from terminals import OnTerminal, environment, on_terminal
 
 from contactfpga import Skin, terminal
+from contactfpga.tools.console import live
 from contactfpga.tools.console.tables import tables
 
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -93,20 +94,24 @@ def test_no_color_where_none_is_wanted(variables, files):
 
 
 def test_a_terminal_that_cannot_be_rewritten_is_not():
-    def too_many(_):
-        """Frames beyond one per second, the first and the last one: some where this test has to wait."""
-        dumb = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", "sim://"], 80, TERM="dumb")
-        wait_until(
-            lambda: "this terminal cannot be redrawn, so one frame per second is shown" in " ".join(dumb.said.split())
-        )
-        began = time.monotonic()
-        wait_until(lambda: dumb.said.count("cells pressed") >= 3)
-        dumb.type("\x03")
-        assert dumb.wait() == 0
-        assert "\x1b" not in dumb.said
-        return dumb.said.count("cells pressed") - (time.monotonic() - began + 3)
+    dumb = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", "sim://"], 80, TERM="dumb")
+    wait_until(lambda: dumb.said.count("cells pressed") >= 3)
+    dumb.type("\x03")
+    assert dumb.wait() == 0
+    assert "this terminal cannot be redrawn, so one frame per second is shown" in " ".join(dumb.said.split())
+    assert "\x1b" not in dumb.said
 
-    assert patiently(too_many, lambda more: more <= 0, range(4)) <= 0
+
+def test_what_cannot_be_rewritten_shows_one_frame_per_second_and_the_last(board, run, tmp_path, monkeypatch):
+    now_s, sent = [0.0], board.hello()
+    clock = SimpleNamespace(monotonic=lambda: now_s[0], sleep=lambda seconds: now_s.append(now_s.pop() + seconds))
+    monkeypatch.setattr(live, "time", clock)
+    for _ in range(41):
+        sent += board.frame()
+        board.time_us += live.REFRESH_US
+    (tmp_path / "x.rec").write_bytes(sent)
+    status, out, _ = run("zones", f"replay://{tmp_path / 'x.rec'}")
+    assert (status, out.count("cells pressed")) == (0, 4), "at 0, 1 and 2 s, and at 2.7 s"
 
 
 @pytest.mark.parametrize(("columns", "lines"), sample([(80, 24), (60, 30)], quick=[(80, 24)]))

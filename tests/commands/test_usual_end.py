@@ -8,6 +8,7 @@ import sys
 
 import pytest
 from fake_board import FakeBoard, wait_until
+from net_processes import free_endpoint
 from sample import sample
 from terminals import OnTerminal, environment
 
@@ -22,7 +23,7 @@ RUNNING = {
     "wire PORT": "pressed (row, column)",
     "view --no-browser PORT": "Ctrl-C ends it",
     "record FILE PORT": "Ctrl-C ends it",
-    "publish --listen tcp/127.0.0.1:17462 PORT": "zenoh://",
+    "publish --listen ENDPOINT PORT": "zenoh://",
     "ros --domain 89 PORT": "Ctrl-C ends it",
 }
 """What each shows once it runs."""
@@ -40,7 +41,7 @@ def test_it_is_the_usual_end(words, number, tmp_path):
     pytest.importorskip(NEEDS.get(words.split()[0], "rich"))
     with FakeBoard(CELLS) as board:
         board.stream = board.frame
-        named = {"PORT": board.path, "FILE": tmp_path / "x.mcap"}
+        named = {"PORT": board.path, "FILE": tmp_path / "x.mcap", "ENDPOINT": free_endpoint()}
         arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "60"]]
         terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *arguments], 80)
         try:

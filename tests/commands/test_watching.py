@@ -106,7 +106,7 @@ def watched_until_silent(run, board):
     def watched(timeout_s):
         return run("doctor", "--watch", "--timeout", timeout_s, board.path)[:2]
 
-    return patiently(watched, lambda found: "says hello" in found[1], (0.3, 3.0, 30.0))
+    return patiently(watched, lambda found: "Touch every switch" in found[1], (0.3, 3.0, 60.0))
 
 
 def test_of_zones_a_watch_says_what_it_cannot_tell(run):

@@ -162,6 +162,7 @@ def test_unplugged_while_waiting(board):
     assert "plug the board in" in str(caught.value)
 
 
+@pytest.mark.usefixtures("_asks_once")
 def test_unplugged_while_iterating(board):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         frames = iter(opened)
@@ -256,6 +257,7 @@ def test_another_skin_than_the_one_asked_for(board):
     assert other.fingerprint.hex() in str(caught.value)
 
 
+@pytest.mark.usefixtures("_asks_once")
 def test_skin_that_changes_mid_stream_is_noticed_after_the_frames_before_it(board):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         opened.next(LONG)

@@ -189,6 +189,8 @@ def test_a_board_is_awaited(board):
             assert not waiting.done()
             await asyncio.to_thread(board.send, b"".join(board.frame() for _ in range(6)))
             found.append((await waiting).sequence)
+            while opened.stats.frames < len(found) + 5:
+                await asyncio.sleep(0.01)
             found += (await opened.batch(0.0, LONG)).frames["sequence"].tolist()
             with pytest.raises(contactfpga.ReadTimeout, match="no frame waits"):
                 await opened.next(timeout=0)
@@ -334,20 +336,19 @@ def test_the_reader_ends_with_its_board(board):
 
 def test_ctrl_c_ends_a_call_that_waits(board, python):
     code = f"""
-import signal, threading, time, os, contactfpga
+import signal, threading, os, contactfpga
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
 board = contactfpga.open({board.path!r}, timeout=60)
 board.latest(60)
-threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-started = time.monotonic()
 try:
+    threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     while True:
         board.next(200)
 except KeyboardInterrupt:
-    print("interrupted", time.monotonic() - started < 60)
+    print("interrupted")
 """
-    result = python(code, timeout=250)
-    assert result.stdout.strip() == "interrupted True", result.stderr
+    result = python(code, timeout=190)
+    assert result.stdout.strip() == "interrupted", result.stderr
 
 
 def test_bitmap_comes_as_cells():

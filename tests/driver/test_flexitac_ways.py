@@ -71,7 +71,7 @@ def for_seconds(run, sheet, *words, recorded=None):
         assert status == 0, errors
         return said
 
-    return patiently(said, lambda said: sum(map(bool, of_json(said))) > 100, (3, 12, 48))
+    return patiently(said, lambda said: sum(map(bool, of_json(said))) > 100, (3, 12, 60))
 
 
 def test_zones_and_tracks_by_command(address, sheet, run):
@@ -107,7 +107,7 @@ def test_recorded_as_mcap_and_exported(address, sheet, run, tmp_path):
         zones = [tuple(float(row[column]) for column in at) for row in rows[1:]]
         return [[zone] for zone in zones if zone[2]]
 
-    found = patiently(exported, lambda found: len(found) > 100, (3, 12, 48))
+    found = patiently(exported, lambda found: len(found) > 100, (3, 12, 60))
     assert usual(found) == (*PLACE_MM, CELLS)
 
 

@@ -348,7 +348,7 @@ def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(b
                 board.send(board.frame())
                 thread = threading.Thread(target=lambda: times.append(host.latest(LONG).time_us), daemon=True)
                 thread.start()
-                thread.join(5.0)
+                thread.join(LONG)
                 assert not thread.is_alive(), "it waits for the lock"
         assert [after - before for before, after in itertools.pairwise(times)] == [300_096] * 3
         assert [others.next(LONG).time_us for _ in range(3)] == times[1:]

@@ -111,6 +111,7 @@ def test_certificates_and_users_as_in_the_example(keys, monkeypatch):
                 contactfpga.open(keys.port(change))
         with pytest.raises(contactfpga.PortNotFound, match=r"cannot connect there: .*something listens there"):
             contactfpga.open(f"zenoh://left?connect={keys.endpoint.replace('tls', 'tcp')}")
+        monkeypatch.setattr(session, "CONNECT_MS", 60_000)
         with pytest.raises(contactfpga.PortNotFound, match=r"nobody publishes it.*do its access rules let this user"):
             contactfpga.open(keys.port(('"robot"', '"visitor"'), ("a long password", "a ticket")))
 

@@ -20,13 +20,14 @@ LINK = """
 name = "{name}"
 skin = "skin.toml"
 port = "zenoh://robot/{name}?connect={endpoint}"
-late_s = 4.0
-silent_s = 5.0
+late_s = 60.0
+silent_s = 90.0
 """
 
 
 @pytest.fixture
-def robot(tmp_path, endpoint):
+def robot(tmp_path, endpoint, monkeypatch):
+    monkeypatch.setattr("contactfpga.robot.net.port.GONE_S", LONG / 3)  # a busy machine lets who lives be silent, too
     (tmp_path / "skin.toml").write_text(SKIN.to_toml())
     path = tmp_path / "robot.toml"
     path.write_text("".join(LINK.format(name=name, endpoint=endpoint) for name in ("left", "right")))

@@ -1,16 +1,17 @@
 """A network that is slower than the board: with `drop` messages are dropped, with `block` the board's port runs over.
 Either way the reader knows how much did not come."""
 
-import time
+from types import SimpleNamespace
 
 import pytest
+import small_port
 from fake_board import wait_until
 from net_processes import Relay, free_endpoint
 from small_port import AwakeClock, SmallPort, published
 
 import contactfpga
 from contactfpga.robot.net import port as net_port
-from contactfpga.robot.net import session
+from contactfpga.robot.net import publisher, session
 from contactfpga.robot.net.message import Message
 
 pytest.importorskip("zenoh")
@@ -38,7 +39,7 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoi
         AwakeClock() as awake,
         session.listening(f"{endpoint}#so_sndbuf=4096") as network,
         Relay(endpoint, BYTES_S) as relay,
-        published(source := SmallPort(now=awake.seconds), network, "slow", block=block) as publisher,
+        published(source := SmallPort(now=awake.seconds), network, "slow", block=block) as sends,
         contactfpga.open(f"zenoh://slow?connect={relay.endpoint}&wait=60", timeout=LONG) as board,
     ):
         unknown = settled(source, board)
@@ -49,8 +50,8 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoi
         source.go(0.0)
         relay.bytes_s = 10**7
         assert settled(source, board) == unknown, "every frame came, or is counted"
-        publisher.end()
-        wait_until(lambda: last_message(board) == publisher.sent - 1, LONG)
+        sends.end()
+        wait_until(lambda: last_message(board) == sends.sent - 1, LONG)
         stats, net = board.stats, board.stats.net
     assert stats.restarts == net.refused == 0
     assert stats.lost > 100
@@ -62,19 +63,20 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoi
         assert net.lost_bytes > 15 * (stats.lost - source.overflowed) > 0
 
 
-def test_a_port_does_not_run_over_while_bytes_are_collected():
-    """For 0.6 s, in which three times as many come as the port holds. While this process has to wait, none comes."""
-    with AwakeClock() as awake, session.listening(free_endpoint()) as network:
-        source = SmallPort(now=awake.seconds)
-        with published(source, network, "slow", batch_s=0.6) as publisher:
-            source.port_bytes = 1024
-            begun_s = time.monotonic()
-            source.go(300.0)
-            wait_until(lambda: source.sent > 400, LONG)
-            publisher.end()
-            took_s = time.monotonic() - begun_s
+def test_a_port_does_not_run_over_while_bytes_are_collected(monkeypatch):
+    """For 0.6 s, in which three times as many come as the port holds."""
+    now_s = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now_s[0], sleep=lambda s: now_s.append(now_s.pop() + s))
+    for user in (small_port, publisher):
+        monkeypatch.setattr(user, "time", clock)
+    source = SmallPort(now=clock.monotonic)
+    source.port_bytes = 1024
+    source.go(300.0)
+    with session.listening(free_endpoint()) as network:
+        slow = publisher.BoardPublisher(source, network, "slow", batch_s=0.6)
+        slow.run(SimpleNamespace(is_set=lambda: source.sent > 400))
     assert source.overflowed == 0
-    assert publisher.sent < 3 + took_s / 0.6
+    assert slow.sent < 3 + now_s[0] / 0.6
 
 
 def last_message(board):
@@ -84,10 +86,8 @@ def last_message(board):
 
 
 def settled(source, board):
-    """Frames that the board has sent and the reader does not know of, once all that was on its way has come."""
-    time.sleep(0.5)
-    hellos = board.stats.hellos
+    """Frames that the board has sent and the reader does not know of, once a hello has come that counts them all."""
     # Over and over, as a network that is still slow drops it.
-    wait_until(lambda: source.say_hello() or board.stats.hellos > hellos, LONG, pause_s=0.3)
+    wait_until(lambda: source.say_hello() or board.hello.sent == source.sent, LONG, pause_s=0.3)
     stats = board.stats
     return source.sent - stats.frames - stats.lost - stats.unexplained

@@ -56,7 +56,7 @@ def go_on(board, reader, since_s):
             assert abs(one.at_s - (board.begun_s + one.time_us / 1e6)) < MOST_S + SLOW_S
 
 
-@pytest.mark.slow
+@pytest.mark.campaign  # it compares the clocks of processes that have to get the processor in time
 def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted(endpoint):
     """Shortly, so that Zenoh does not notice, and for so long that it closes connections."""
     port = f"zenoh://contactfpga/left-forearm?connect={endpoint}&wait=60"

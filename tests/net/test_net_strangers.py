@@ -1,12 +1,9 @@
-"""Whatever others send under a key, reader and publisher go on within a second; other users are kept out."""
+"""Whatever others send under a key, reader and publisher go on; other users are kept out."""
 
-import collections
-import itertools
 import os
 import stat
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
@@ -25,8 +22,6 @@ pytestmark = pytest.mark.usefixtures("_closed_ports")
 SKIN = contactfpga.Skin(name="left forearm")
 KEY = "contactfpga/left-forearm"
 LONG = 60.0
-TRIES = 4
-"""Number of tries, of which one is quick enough even on a busy machine."""
 
 
 def first_message(network):
@@ -42,38 +37,25 @@ def first_message(network):
 def test_one_forged_message_of_any_number_silences_no_reader(far, endpoint):
     with Streaming(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
         with contactfpga.open(patient(publisher.line), timeout=LONG) as reader, session.connected(endpoint) as stranger:
-            took_s = []
-            while not took_s or (min(took_s) > 1.5 and len(took_s) < TRIES):
-                read, refused = first_message(stranger), reader.stats.net.refused
-                forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
-                stranger.put(f"{KEY}/bytes", forged.encode())
-                wait_until(lambda refused=refused: reader.stats.net.refused > refused, LONG)
-                begun_s = time.monotonic()
-                assert reader.read(LONG).time_us in board.sent_us
-                took_s.append(time.monotonic() - begun_s)
-            assert min(took_s) < 1.5
+            read, refused = first_message(stranger), reader.stats.net.refused
+            forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
+            stranger.put(f"{KEY}/bytes", forged.encode())
+            wait_until(lambda: reader.stats.net.refused > refused, LONG)
+            assert reader.read(LONG).time_us in board.sent_us
             frames = reader.stats.frames
             wait_until(lambda: reader.next(LONG) and reader.stats.frames > frames + 50, LONG)
 
 
-def test_a_forged_token_keeps_no_publisher_from_starting_and_hides_no_death(endpoint):
+def test_a_forged_token_keeps_no_publisher_from_starting(endpoint):
+    """test_net_port.py has that it hides no death."""
     with Streaming(SKIN) as board, router(endpoint), session.connected(endpoint) as stranger:
         stranger.liveliness().declare_token(f"{KEY}/alive/00000000deadbeef")
-        took_s = []
-        while not took_s or (min(took_s) > 2.0 and len(took_s) < TRIES):
-            with publish(board.path, "--connect", endpoint) as publisher:
-                assert publisher.line.startswith("zenoh://"), publisher.end()
-                number = first_message(stranger).publisher
-                token = stranger.liveliness().declare_token(f"{KEY}/alive/{number:016x}")
-                with contactfpga.open(publisher.line, timeout=LONG) as reader:
-                    assert reader.read(LONG)
-                    publisher.end()
-                    ended_s = time.monotonic()
-                    with pytest.raises(contactfpga.PortLost, match="its publisher ended"):
-                        collections.deque((reader.next(LONG) for _ in itertools.count()), maxlen=0)
-                    took_s.append(time.monotonic() - ended_s)
-                token.undeclare()
-        assert min(took_s) < 2.0
+        with publish(board.path, "--connect", endpoint) as publisher:
+            assert publisher.line.startswith("zenoh://"), publisher.end()
+            number = first_message(stranger).publisher
+            stranger.liveliness().declare_token(f"{KEY}/alive/{number:016x}")
+            with contactfpga.open(patient(publisher.line), timeout=LONG) as reader:
+                assert reader.read(LONG)
 
 
 # ---- the Unix socket that is the default

@@ -5,7 +5,6 @@ import itertools
 import os
 import signal
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -108,21 +107,23 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
         assert publisher.process.wait(LONG) == 1
 
 
+def pass_on(streaming):
+    """Wait until the publisher has sent frames that come from now on; ``streaming`` waits for it to read them."""
+    for _ in range(2):  # it reads again once it has sent
+        sent = streaming.sent
+        wait_until(lambda sent=sent: streaming.sent > sent + 100 and not streaming.waiting(), LONG)
+
+
 @pytest.mark.slow
-def test_a_killed_publisher_shows_within_a_second(streaming, endpoint, monkeypatch):
-    """0.5 s of patience, and what the network takes; in one of several tries, as this machine may be busy."""
-    took_s = []
+def test_a_killed_publisher_is_lost_and_not_found_again(streaming, endpoint, monkeypatch):
+    monkeypatch.setattr(net_port, "GONE_S", LONG / 3)  # a busy machine lets who lives be silent, too
     with router(endpoint):
-        while not took_s or (min(took_s) > 1.0 and len(took_s) < 5):
-            with publish(streaming.path, "--connect", endpoint) as publisher:
-                with contactfpga.open(publisher.line, timeout=LONG) as board:
-                    take(board, 1, streaming.sent_us)
-                    os.kill(publisher.process.pid, signal.SIGKILL)
-                    killed_s = time.monotonic()
-                    with pytest.raises(contactfpga.PortLost, match="its publisher ended, or the network is broken"):
-                        collections.deque((board.next(LONG) for _ in itertools.count()), maxlen=0)
-                    took_s.append(time.monotonic() - killed_s)
-        assert min(took_s) < 1.0
+        with publish(streaming.path, "--connect", endpoint) as publisher:
+            with contactfpga.open(publisher.line, timeout=LONG) as board:
+                take(board, 1, streaming.sent_us)
+                os.kill(publisher.process.pid, signal.SIGKILL)
+                with pytest.raises(contactfpga.PortLost, match="its publisher ended, or the network is broken"):
+                    collections.deque((board.next(LONG) for _ in itertools.count()), maxlen=0)
         monkeypatch.setattr(net_port, "FOUND_S", 0.5)
         with pytest.raises(contactfpga.PortNotFound, match=r"nobody publishes it; is `contactfpga publish` running"):
             contactfpga.open(publisher.line)
@@ -145,10 +146,12 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
 
 @pytest.mark.slow
 def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
+    streaming.waits = True
     with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):
         with contactfpga.open(port(endpoint, wait_s=60), timeout=LONG) as board:
             take(board, 20, streaming.sent_us)
             first.end()
+            pass_on(streaming)
             frames = board.stats.frames
             with router(endpoint):
                 take_until(board, lambda: board.stats.frames > frames + 50, streaming.sent_us)
@@ -159,17 +162,16 @@ def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
 
 
 def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
+    streaming.waits = True
     with publish(streaming.path, "--listen", endpoint), Relay(endpoint) as relay:
         with contactfpga.open(port(relay.endpoint, wait_s=60), timeout=LONG) as board:
-            for pause_s in (0.1, 1.0, 3.0, 9.0):
+            for _ in range(2):
                 take(board, 20, streaming.sent_us)
                 relay.cut()
-                time.sleep(pause_s)
+                pass_on(streaming)
                 relay.mend()
                 frames = board.stats.frames
                 take_until(board, lambda frames=frames: board.stats.frames > frames + 20, streaming.sent_us)
-                if pause_s >= 1.0 and board.stats.net.lost_messages:
-                    break  # else the publisher had to wait all that time
             assert board.stats.net.lost_messages > 0
             assert board.stats.net.publishers == 1
             assert board.stats.lost > 0

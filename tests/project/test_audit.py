@@ -89,7 +89,7 @@ def test_a_proof_or_a_board_that_contradicts_is_wrong(monkeypatch, error):
 def tests(tmp_path, monkeypatch):
     """``tests(text)``: a project whose only tests are these, each claim's for some seconds."""
 
-    def tests(text, seconds=60):
+    def tests(text, seconds=200):
         (tmp_path / "tests").mkdir(exist_ok=True)
         (tmp_path / "tests" / "test_a.py").write_text(f"import time, subprocess\n\n\n{text}")
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    campaign:\n")

@@ -5,20 +5,23 @@ import sys
 from pathlib import Path
 
 import pytest
-from fake_board import patiently
+from fake_board import wait_until
 from terminals import OnTerminal
 
 ROOT = Path(__file__).resolve().parents[2]
 
 PIP = """
 import os, sys, time
+def wait_for(step):
+    while "STEPS" in os.environ and not os.path.exists(os.environ["STEPS"] + step):
+        time.sleep(0.01)
 print("arguments:", sys.argv[1:])
 print('Processing ./package.whl')
 for number in range(39):
     print(f"Collecting package-{number}", flush=True)
-time.sleep(float(os.environ.get("PAUSE", 0)))
+wait_for("fetching")
 print("Installing collected packages: a, b", flush=True)
-time.sleep(float(os.environ.get("PAUSE", 0)))
+wait_for("unpacking")
 print("ERROR: no room" if "--fail" in sys.argv else "Successfully installed a-1 b-2", file=sys.stderr)
 sys.exit(3 if "--fail" in sys.argv else 0)
 """
@@ -59,13 +62,10 @@ def test_a_failure_shows_the_end_of_them_and_where_they_are(install):
 def test_a_terminal_sees_how_far_it_is(install):
     command, log = install
 
-    def shown(pause_s):
-        terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent), PAUSE=str(pause_s))
-        assert terminal.wait(200) == 0
-        return terminal.said
-
-    said = patiently(shown, lambda said: "fetching, 40" in said and "unpacking, 40" in said, (1.2, 6.0, 36.0))
-    assert "fetching, 40 packages, " in said
-    assert "unpacking, 40 packages, " in said
-    assert "Collecting" not in said
-    assert said.endswith("\r\033[K")
+    terminal = OnTerminal(command, 80, PYTHONPATH=str(log.parent), STEPS=f"{log.parent}/")
+    for step in ("fetching", "unpacking"):
+        wait_until(lambda step=step: f"{step}, 40 packages, " in terminal.said)
+        (log.parent / step).touch()
+    assert terminal.wait() == 0
+    assert "Collecting" not in terminal.said
+    assert terminal.said.endswith("\r\033[K")

@@ -1,5 +1,6 @@
 """Publishing by Cyclone DDS, read back by another participant of the same process."""
 
+import os
 import socket
 import sys
 import time
@@ -15,8 +16,8 @@ from contactfpga.robot.ros.settings import TOPICS
 
 pytest.importorskip("cyclonedds")
 
-DOMAIN = 87
-"""Of these tests alone, lest they meet what else runs here."""
+DOMAIN = 100 + os.getpid() % 100
+"""Of this process alone, lest it meets what else runs here."""
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Flips of single bits: every bit is there, each is followed, and what came of it is judged rightly."""
 
 import json
-import time
+import queue
 import types
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -281,21 +281,33 @@ def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_mis
 
 @pytest.mark.parametrize("within_s", [None, 0.3])
 def test_what_is_not_begun_in_time_is_left_out_and_the_first_block_of_each_never(monkeypatch, within_s):
-    """One worker, ten blocks of registers and five of memory for each of two designs, 50 ms each."""
-    begun = []
+    """One worker, ten blocks of registers and five of memory for each of two designs; the time is over in the tenth."""
+    begun, timers = [], queue.Queue()
+
+    class Timer:
+        def __init__(self, seconds, over):
+            self._over = over
+
+        def start(self):
+            timers.put(self._over)
+
+        def cancel(self):
+            pass
 
     def block(design, memory, number):
         begun.append((design, memory, number))
-        time.sleep(0.05)
+        if within_s and len(begun) == 10:
+            timers.get(timeout=60)()
         return [FlipOutcome(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
 
     monkeypatch.setattr(campaign, "_block", block)
+    monkeypatch.setattr(campaign, "threading", types.SimpleNamespace(Timer=Timer))
     counted = []
     with ThreadPoolExecutor(1) as executor:
         rows = campaign.run(["a", "b"], 250, 125, executor, counted.append, within_s)
     firsts = [(name, memory, 0) for name in "ab" for memory in (False, True)]
     assert sorted(begun[:4]) == sorted(firsts)
-    assert (len(begun) == 30) == (within_s is None)
+    assert len(begun) == (10 if within_s else 30)
     assert counted == [30] * len(begun)
     found = {(row.design, row.found.memory, int(row.found.name.split()[1])) for row in rows}
     assert len(rows) == campaign.BLOCK * len(found)

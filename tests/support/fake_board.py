@@ -23,7 +23,7 @@ def wait_until(condition, seconds=60.0, pause_s=0.002):
         time.sleep(pause_s)
 
 
-def patiently(attempt, enough, timeouts_s=(1.0, 6.0, 36.0)):
+def patiently(attempt, enough, timeouts_s=(1.0, 6.0, 60.0)):
     """What ``attempt(timeout_s)`` returns, as soon as that is ``enough``, with one timeout after the other: a busy
     machine may let a short one pass before anything came."""
     for timeout_s in timeouts_s:
@@ -120,9 +120,9 @@ class FakeBoard(ModelBoard):
                 self.send(self.hello())
             ready, _, _ = select.select([self._master], [], [], 0 if self.stream else 0.005)
             if ready:
-                heard = self.hear(os.read(self._master, 100))
+                answers, heard = self.answers, self.hear(os.read(self._master, 100))
                 self.asked += len(heard)
-                if self.answers and heard:
+                if answers and heard:
                     time.sleep(self.delay_s)
                     self.send(self._answer(any(hello for _, hello in heard)))
             elif self.stream:

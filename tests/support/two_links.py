@@ -51,10 +51,14 @@ def with_units(robot):
 
 
 class Streaming(DirectPort):
-    """Sends a frame every 5 ms, and nothing once it is mute."""
+    """Sends a frame every 5 ms, and nothing once it is mute. Its clock runs as the host's does."""
 
     mute = False
     due_s = 0.0
+
+    def frame(self, **options):
+        self.time_us = max(self.time_us, round(1e6 * time.monotonic()))
+        return super().frame(**options)
 
     def read(self, seconds):
         if not self._out and seconds:
