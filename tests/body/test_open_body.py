@@ -166,7 +166,7 @@ def test_stats_go_on_where_a_board_comes_back(patient):
         before = body.stats.links["arm"]
         plugged.plug("a")
         wait_until(lambda: body.stats.links["arm"].frames > before.frames)
-        assert body.stats.links["arm"].hellos == before.hellos + 1
+        assert body.stats.links["arm"].hellos > before.hellos
         stats = body.stats
         assert stats.frames == sum(one.frames for one in stats.links.values())
         assert stats.damaged == {}
