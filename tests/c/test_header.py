@@ -343,27 +343,16 @@ def test_a_hello_that_cannot_be_is_refused_alike(decoder, field, value, taken):
 
 
 ROUND = Skin(rows=6, columns=7, surface="cylinder", radius_mm=9.0, closed=True)
-DIVIDED = Skin(report="barycenter", barycenter_bits=3)
+CHANGES = {
+    Skin(): [{"rows": 15}, {"columns": 15}, {"connectivity": 4}, {"report": "cells"}, {"zone_capacity": 9}],
+    Skin(clock_hz=24_000_000): [{"pitch_x_mm": 9.0}, {"pitch_y_mm": 9.0}, {"surface": "cylinder", "radius_mm": 99.0}],
+    Skin(report="barycenter", barycenter_bits=3): [{"barycenter_bits": 4}],
+    Skin(report="cells"): [{"diodes": "none"}],
+    ROUND: [{"radius_mm": 8.0}, {}],  # with {} its ends do not meet, which no Skin of this pitch allows
+}
 
 
-@pytest.mark.parametrize(
-    ("skin", "changed"),
-    [
-        (Skin(), {"rows": 15}),
-        (Skin(), {"columns": 15}),
-        (Skin(), {"connectivity": 4}),
-        (Skin(), {"report": "cells"}),
-        (DIVIDED, {"barycenter_bits": 4}),
-        (Skin(), {"zone_capacity": 9}),
-        (Skin(), {"pitch_x_mm": 9.0}),
-        (Skin(), {"pitch_y_mm": 9.0}),
-        (Skin(), {"surface": "cylinder", "radius_mm": 99.0}),
-        (ROUND, {"radius_mm": 8.0}),
-        (ROUND, {}),  # but that its ends do not meet, which no Skin of this pitch allows
-        (Skin(report="cells"), {"diodes": "none"}),
-    ],
-    ids=lambda value: ", ".join(value) or "closed" if isinstance(value, dict) else "sheet",
-)
+@pytest.mark.parametrize(("skin", "changed"), [(skin, one) for skin, found in CHANGES.items() for one in found])
 def test_a_sheet_that_is_another_by_one_field_is_a_change(decoder, skin, changed):
     """Also where the fingerprint is that of before; times and counts then begin anew."""
     wire = ModelBoard(skin).wire
