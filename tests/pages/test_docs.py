@@ -133,23 +133,25 @@ def test_commands_without_output_run_as_printed(page, tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     (tmp_path / "my.toml").write_text(contactfpga.Skin(release_us=17.0).to_toml())
     variables = environment(BROWSER="true", XDG_RUNTIME_DIR=".")  # no window, and a socket of its own
-    running = {}
-    for command in EARLIER.get(page, []) + RUN[page]:
-        program = ["-c", patience() + PUBLISHER] if page == "docs/net.md" else ["-m", "contactfpga"]
-        words = [sys.executable, *program, *shlex.split(command)]
-        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "cwd": tmp_path, "preexec_fn": listening}
-        running[command] = subprocess.Popen(words, **options, env=variables)
-        if command.startswith(UNTIL_CTRL_C):
-            assert running[command].stdout.read1()
-        else:
-            process = running.pop(command)
-            said, _ = process.communicate(timeout=600)
-            assert process.returncode == 0, said
-    for command, process in reversed(running.items()):
-        assert process.poll() is None, command
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
-        assert process.returncode == 0, command
+    with contextlib.ExitStack() as stack:
+        running = {}
+        for command in EARLIER.get(page, []) + RUN[page]:
+            program = ["-c", patience() + PUBLISHER] if page == "docs/net.md" else ["-m", "contactfpga"]
+            words = [sys.executable, *program, *shlex.split(command)]
+            options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "cwd": tmp_path, "preexec_fn": listening}
+            process = running[command] = subprocess.Popen(words, **options, env=variables)
+            stack.callback(process.kill)  # none outlives a test that fails
+            if command.startswith(UNTIL_CTRL_C):
+                assert process.stdout.read1()
+            else:
+                del running[command]
+                said, _ = process.communicate(timeout=600)
+                assert process.returncode == 0, said
+        for command, process in reversed(running.items()):
+            assert process.poll() is None, command
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+            assert process.returncode == 0, command
 
 
 def documented(page: str) -> set[str]:
