@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -293,7 +294,7 @@ def test_a_terminal_is_told_which_it_is_and_how_to_get_the_other(both):
 
 
 def test_other_skins_need_one_and_say_so_in_a_line(tmp_path):
-    done = alone(tmp_path, "zones", f"sim://?skin={examples() / '8x8.toml'}", "--json", "--once")
+    done = alone(tmp_path, "zones", f"sim://?skin={quote(str(examples() / '8x8.toml'))}", "--json", "--once")
     assert done.returncode != 0
     (line,) = done.stderr.splitlines()
     assert "needs a C++ compiler" in line

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
+from urllib.parse import quote
 
 from contactfpga.choices import scans
 from contactfpga.choices.choice import look_in, modules, refuse_modules, trusted
@@ -174,7 +175,9 @@ class Skin:
         unknown = sorted(set(values) - set(known))
         if unknown:
             if unknown == ["sheets"]:
-                steps = f"name one of them, or give all as --sheets {shell_words(path)} or {shell_words(f'sim://?sheets={path}')}"
+                steps = (
+                    f"name one of them, or give all as --sheets {shell_words(path)} or sim://?sheets={quote(str(path))}"
+                )
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             known += ["[cover]", "[circuit]"]
             raise SkinError(f"{path}: unknown key {shown(unknown[0])}; {suggestion(unknown[0], known)}")

@@ -118,7 +118,7 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )
-    terminal.say(f"next: contactfpga settle --skin {shell_words(answer['folder'] + '/skin.toml')}", hang=2)
+    terminal.say(f"next: contactfpga settle --skin {shell_words(Path(answer['folder'], 'skin.toml'))}", hang=2)
     if answer["kicad"] is not None:
         terminal.say(f"KiCad: {len(answer['kicad'])} findings")
         for finding in answer["kicad"]:
