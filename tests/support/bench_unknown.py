@@ -30,12 +30,6 @@ from contactfpga_hdl.link.link import hello_words
 RESET_CLOCKS = 4
 """Clocks of reset after power-up. The iCE40 boards give 181, an ECP5 as many as its global reset takes."""
 
-INITIALIZED = (r"debounce\.state\[",)
-"""Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the states of
-debounce. They are put there after the first clock: until then unknown registers may write anywhere. In an FPGA they
-hold zero or their initial value, and the reset keeps them there. With the labeller `serial` there are more zeros:
-:func:`initialized`."""
-
 _GATES = (
     f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "
     "memory_map; dffunmap; opt_clean; write_verilog -noattr gates.v"
@@ -47,8 +41,14 @@ class Unknown(AssertionError):
 
 
 def initialized(skin: Skin) -> tuple[str, ...]:
-    """:data:`INITIALIZED`, the hello's bytes, and of the memory of the labeller `serial` the half that stays zero."""
-    words = (*INITIALIZED, rf"link\.store\[({'|'.join(map(str, hello_words(skin)))})\]")
+    """Patterns of the memory words that the design needs at power-up and the bitstream brings.
+
+    These are the hello's bytes, and of the memory of the labeller `serial` the half that stays zero.
+
+    They are put there after the first clock: until then unknown registers may write anywhere. In an FPGA they hold zero
+    or their initial value, and the reset keeps them there.
+    """
+    words = (rf"link\.store\[({'|'.join(map(str, hello_words(skin)))})\]",)
     if skin.labeller != "serial" or skin.report == "cells":
         return words
     places = skin.columns if skin.connectivity == 4 else -(-skin.columns // 2)
