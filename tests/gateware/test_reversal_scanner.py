@@ -89,8 +89,10 @@ def live(skin: Skin, at, cycles: int, ready=None, late=lambda: 2) -> Life:
         return int(cycle in ends[-2:])
 
     bench.drive(dut.packed, is_packed)
-    contact, stuck, motion = (bench.watch(port) for port in (dut.contact, dut.tag.stuck, dut.tag.motion))
+    told = (dut.contact, dut.tag.stuck, dut.tag.motion, dut.tag.fault)
+    contact, stuck, motion, fault = map(bench.watch, told)
     bench.run(cycles)
+    assert fault.values == [int(count > 0) for count in stuck.values]
     words = sheet.selected
     changes = [(cycle, word) for cycle, word in enumerate(words) if word != (words[cycle - 1] if cycle else 0)]
     taken = [
