@@ -145,5 +145,5 @@ def test_a_sheet_of_several_is_shown():
 
 
 def test_a_virtual_board_of_a_skin_is_no_robot():
-    with pytest.raises(FileNotFoundError, match=r"/no/skin\.toml"):
+    with pytest.raises(contactfpga.PortNotFound, match=r"/no/skin\.toml"):
         opening._source(opening.ViewRequest("sim://?skin=/no/skin.toml"))

@@ -31,8 +31,8 @@ AGAIN_S = 0.01
 
 _came: int | None = None
 """The signal since the command began, unless it was the normal end."""
-_runs = False
-"""Whether a command runs that a signal should end."""
+_run: object = None
+"""The run of a command that a signal should end; None: there is none."""
 
 
 class Interruption(KeyboardInterrupt):
@@ -45,8 +45,8 @@ def guarded(body: Callable[[], int | None]) -> int:
     Shells start background processes with Ctrl-C ignored, but the same signal ends them; this function handles it
     anyway.
     """
-    global _came, _runs
-    _came, _runs = None, True
+    global _came, _run
+    _came, _run = None, object()
     terminal.prepare()
     try:
         with _listening():
@@ -54,7 +54,7 @@ def guarded(body: Callable[[], int | None]) -> int:
     except KeyboardInterrupt:  # it came while listening began or ended
         return _cut_short()
     finally:
-        _runs = False
+        _run = None
         # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by
         # SIGINT, whatever the status, unless another text is run to its end.
         exec("")
@@ -97,8 +97,8 @@ def _status(body: Callable[[], int | None]) -> int:
 
 
 def _cut_short(said: str = "") -> int:
-    global _runs
-    _runs = False
+    global _run
+    _run = None
     number = signal.SIGINT if _came is None else _came
     if threading.current_thread() is threading.main_thread():
         signals.end_all_at_once()  # should it be told twice
@@ -153,16 +153,16 @@ def _interrupt(number: int, _: object) -> None:
     _came = number
     silence_amaranth()  # before anything is left half made
     # No object of `threading`, whose locks the interrupted code may hold.
-    _thread.start_new_thread(_repeat, (number,))
+    _thread.start_new_thread(_repeat, (number, _run))
     raise KeyboardInterrupt
 
 
-def _repeat(number: int) -> None:
+def _repeat(number: int, run: object) -> None:
     """Send a signal again if the command goes on: destructors drop its exception, and so do libraries in C, as numpy
     does while it looks at a type.
     """
     time.sleep(AGAIN_S)
-    while _runs and _came is not None:
+    while run is not None and _run is run and _came is not None:
         if not _ending():
             _send(number)  # which starts another thread like this one
             return
