@@ -37,7 +37,7 @@ def extent(shown, visitor):
 
 def fitted(shown, visitor, apart_from=()):
     """The same, and the camera's position, once the forearm fills the canvas from elsewhere than from those places."""
-    for _ in range(300):
+    for _ in range(600):
         place = next(iter(shown.web.get_clients().values())).camera.position
         x, y = extent(shown, visitor)
         fills = max(np.ptp(x), np.ptp(y)) == pytest.approx(1 / 1.04, abs=0.02)
@@ -53,7 +53,7 @@ def resized(shown, visitor, width, height):
     """The canvas' left, top, width and height once it has settled, and the server knows of it."""
     visitor.page.set_viewport_size({"width": width, "height": height})
     wanted = (width - 334, height) if width > 500 else (width, 0.54 * height)
-    for _ in range(150):
+    for _ in range(600):
         left, top, wide, high = visitor.page.evaluate("window.box()")
         aspect = next(iter(shown.web.get_clients().values())).camera.aspect
         if (wide, high) == pytest.approx(wanted, abs=12) and aspect == pytest.approx(wide / high, abs=0.02):
@@ -77,7 +77,7 @@ def test_a_drag_presses_and_no_arrow_covers_the_sheet(seen):
     shown, visitor = seen
     sheet = shown.view.stage.tiles.sheet
     visitor.drag(*((2 * sheet.pitch_x_mm, row * sheet.pitch_y_mm) for row in (4, 7, 9)), hold_ms=1000)
-    for _ in range(100):
+    for _ in range(1200):
         if shown.hand.fingers and abs(shown.hand.fingers[0].y_mm - 90) < 2:
             break
         visitor.page.wait_for_timeout(100)

@@ -55,6 +55,9 @@ WATCH = """
 """
 """``watch(x, y)``: wait for a zone's barycenter, by its unique color, at that share of the canvas."""
 
+OVER = "() => window.__viserMutable.canvas.style.cursor === 'pointer'"
+"""Whether the page knows that the mouse is over something to be clicked."""
+
 
 def program() -> str | None:
     """The installed browser, or None."""
@@ -101,7 +104,7 @@ class Visitor:
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
         self.page.mouse.move(*self._pixel(shares[0]))
-        self.page.wait_for_timeout(hold_ms)  # the page finds out what the mouse is over
+        self.page.wait_for_function(OVER, timeout=1e3 * PATIENCE_S)
         self.page.mouse.down()
         for one in shares[1:]:
             self.page.mouse.move(*self._pixel(one), steps=8)
