@@ -166,8 +166,7 @@ def test_two_cores_of_different_skins_are_read_together(run, written, tmp_path):
         shutil.copy(written("raster") / name, tmp_path / f"other_{name}")
     sources = "chest.v example.v other_contactfpga_core.v other_example.v"
     asserted = "read_verilog -sv -formal chest_sva.sv other_contactfpga_core_sva.sv"
-    tops = "module both; chest_peripheral one (); contactfpga_core_peripheral other (); endmodule"
-    (tmp_path / "both.v").write_text(tops)
+    (tmp_path / "both.v").write_text("module both; chest_peripheral a (); contactfpga_core_peripheral b (); endmodule")
     native.yosys(f"read_verilog {sources} both.v; {asserted}; hierarchy -check -top both", tmp_path)
 
 

@@ -127,13 +127,9 @@ FAULTS = {
 }  # fmt: skip
 
 PROVED = {
-    "a restart is over with a frame that is packed, not with one that is left out": Fault(
-        "top.py",
-        "blind & ~_packed(packer)",
-        "blind & ~packer.frames.commit",
-        f"{FORMAL}[the first frame is sent, raster]",
-    ),
-}
+    "a restart is over with a frame that is packed, not with one that is left out": Fault("top.py",
+        "blind & ~_packed(packer)", "blind & ~packer.frames.commit", f"{FORMAL}[the first frame is sent, raster]"),
+}  # fmt: skip
 """Faults that change nothing, and the proofs that say why. Here the first frame after a restart is always packed."""
 
 

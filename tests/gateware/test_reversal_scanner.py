@@ -89,8 +89,7 @@ def live(skin: Skin, at, cycles: int, ready=None, late=lambda: 2) -> Life:
         return int(cycle in ends[-2:])
 
     bench.drive(dut.packed, is_packed)
-    told = (dut.contact, dut.tag.stuck, dut.tag.motion, dut.tag.fault)
-    contact, stuck, motion, fault = map(bench.watch, told)
+    contact, stuck, motion, fault = map(bench.watch, (dut.contact, dut.tag.stuck, dut.tag.motion, dut.tag.fault))
     bench.run(cycles)
     assert fault.values == [int(count > 0) for count in stuck.values]
     words = sheet.selected
