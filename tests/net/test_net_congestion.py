@@ -7,7 +7,7 @@ import pytest
 import small_port
 from fake_board import wait_until
 from net_processes import Relay, free_endpoint
-from small_port import AwakeClock, SmallPort, published
+from small_port import SmallPort, published
 
 import contactfpga
 from contactfpga.robot.net import port as net_port
@@ -36,16 +36,14 @@ class FirstKept(net_port.ZenohPort):
 def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoint):
     monkeypatch.setattr(net_port, "ZenohPort", FirstKept)
     with (
-        AwakeClock() as awake,
         session.listening(f"{endpoint}#so_sndbuf=4096") as network,
         Relay(endpoint, BYTES_S) as relay,
-        published(source := SmallPort(now=awake.seconds), network, "slow", block=block) as sends,
+        published(source := SmallPort(), network, "slow", block=block) as sends,
         contactfpga.open(f"zenoh://slow?connect={relay.endpoint}&wait=60", timeout=LONG) as board,
     ):
         unknown = settled(source, board)
         sent = source.sent
         source.go(2000.0)
-        # For 1.5 s, or until enough is lost; while this process has to wait, none comes.
         enough = lambda: source.overflowed > 200 if block else board.stats.net.lost_messages > 10  # noqa: E731
         wait_until(lambda: source.sent - sent >= 3000 and enough(), LONG)
         source.go(0.0)
@@ -70,7 +68,7 @@ def test_a_port_does_not_run_over_while_bytes_are_collected(monkeypatch):
     clock = SimpleNamespace(monotonic=lambda: now_s[0], sleep=lambda s: now_s.append(now_s.pop() + s))
     for user in (small_port, publisher):
         monkeypatch.setattr(user, "time", clock)
-    source = SmallPort(now=clock.monotonic)
+    source = SmallPort()
     source.port_bytes = 1024
     source.go(300.0)
     with session.listening(free_endpoint()) as network:

@@ -10,57 +10,28 @@ import contactfpga
 from contactfpga.robot.net.publisher import BoardPublisher
 
 
-class AwakeClock:
-    """Counts the seconds in which this process gets the processor: a thread that sleeps shortly, and then longer than
-    it should, had to wait. A context manager."""
-
-    def __init__(self):
-        self._passed_s = 0.0
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._count, daemon=True)
-
-    def seconds(self):
-        return self._passed_s
-
-    def _count(self):
-        looked_s = time.monotonic()
-        while not self._ended.wait(0.002):
-            now_s = time.monotonic()
-            self._passed_s += min(now_s - looked_s, 0.02)
-            looked_s = now_s
-
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._ended.set()
-        self._thread.join()
-
-
 class SmallPort(ModelBoard):
     """A board behind a port with little memory: what does not find room is lost, frame by frame. It answers requests,
     and sends frames and hellos by itself after :meth:`go`."""
 
     threaded = True
 
-    def __init__(self, skin=None, now=time.monotonic):
+    def __init__(self, skin=None):
         super().__init__(skin or contactfpga.Skin())
-        self._now = now  # in which it sends
         self._rate_hz = 0.0
         self.port_bytes = 4096
         self.overflowed = 0
-        self._kept, self._begun_s = b"", now()
+        self._kept, self._begun_s = b"", time.monotonic()
         self._due_s = self._hello_due_s = 0.0
         self._lock = threading.Lock()
 
     def go(self, rate_hz):
         """From now on, so many frames per second."""
         with self._lock:
-            self._rate_hz, self._due_s = rate_hz, self._now()
+            self._rate_hz, self._due_s = rate_hz, time.monotonic()
 
     def _fill(self):
-        now_s = self._now()
+        now_s = time.monotonic()
         while self._rate_hz and self._due_s < now_s:
             if self._due_s > self._hello_due_s:
                 self._hello_due_s = now_s + 0.5
@@ -69,7 +40,7 @@ class SmallPort(ModelBoard):
             self._send(1)
 
     def _send(self, count):
-        self.time_us = max(self.time_us, round((self._now() - self._begun_s) * 1e6))
+        self.time_us = max(self.time_us, round((time.monotonic() - self._begun_s) * 1e6))
         data = b"".join(self.frame() for _ in range(count))
         if len(self._kept) + len(data) <= self.port_bytes:
             self._kept += data
