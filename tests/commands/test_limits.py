@@ -238,6 +238,15 @@ def test_very_many_elements_are_refused(tmp_path):
         urdf.load(path)
 
 
+@pytest.mark.parametrize("start", [b"<!--", b"<?", b"<![CDATA["])
+def test_comments_without_an_end_are_quick(tmp_path, start):
+    path = tmp_path / "x.urdf"
+    path.write_bytes(b"\n<?xml version='1.0'?><robot>" + start * (2_000_000 // len(start)))
+    with Cost() as cost, pytest.raises(BodyError, match=f"^{path}: not a URDF file"):
+        urdf.load(path)
+    assert cost.cpu_s < 5
+
+
 # ---- meshes
 
 
@@ -279,6 +288,7 @@ def test_archives_of_meshes_are_not_unpacked(tmp_path, name):
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 3\n" * (mesh_file.MAX_TRIANGLES + 1), "500,001 triangles; the limit is"),
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 9\n", "x.obj: "),
         ("x.dae", DAE.format('<instance_node url="#n"/>' * 2).encode(), "it shows a node at several places"),
+        ("x.dae", DAE.replace("xmlns", "xmlns:n").format('<n:instance_node url="#n"/>' * 2).encode(), "several places"),
         ("x.dae", DAE.format('<instance_geometry url="#g"/>' * 900).encode(), "it shows one part at 900 places"),
         ("x.dae", b"<!DOCTYPE x>" + DAE.encode(), "it declares a document type"),
     ],

@@ -69,7 +69,7 @@ def _check_collada(data: bytes, path: Path) -> None:
         raise SurfaceError(f"{path}: it is an archive; unpack it")
     shown: collections.Counter[str] = collections.Counter()
     for element in xmlfile.parse(data, path, "a mesh", SurfaceError).iter():
-        name = element.tag.rpartition("}")[2]
+        name = element.tag.rpartition(":")[2]
         if name == "instance_node":
             raise SurfaceError(f"{path}: it shows a node at several places; export it as one mesh")
         if name in ("instance_geometry", "instance_controller"):

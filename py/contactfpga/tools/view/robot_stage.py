@@ -61,9 +61,8 @@ def _visual(element: ElementTree.Element, link: str, folder: Path) -> Visual | N
     path = None if mesh is None else _path(mesh.get("filename", ""), folder)
     if path is None:
         return None
-    where, origin = f"a mesh of link {shown(link)}", element.find("origin")
-    shift, turn = (urdf_file.vector(origin, key, where) for key in ("xyz", "rpy"))
-    return Visual(link, Pose.of(shift, turn), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
+    where = f"a mesh of link {shown(link)}"
+    return Visual(link, urdf_file.pose(element.find("origin"), where), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
 
 
 def _path(name: str, folder: Path) -> Path | None:
