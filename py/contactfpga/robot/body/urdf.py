@@ -94,15 +94,13 @@ def _robot(root: ElementTree.Element) -> Robot:
         if joint.child in children:
             raise BodyError(f"link {shown(joint.child)} hangs on two joints; a URDF is a tree")
         children.add(joint.child)
-    if not links:
-        raise BodyError("it has no link; is it a robot, and expanded if it is xacro?")
     _free_base(links, joints)
     for joint in joints.values():
         if joint.mimic is not None and joint.mimic[0] not in joints:
             raise BodyError(f"joint {shown(joint.name)} follows {shown(joint.mimic[0])}, which is not there")
     roots = list(set(links).difference(joint.child for joint in joints.values()))
     if len(roots) != 1:
-        raise BodyError(f"{len(roots)} links hang on no joint; a robot has one base")
+        raise BodyError(f"{len(roots)} of its {len(links)} links hang on no joint; a robot has one base")
     return Robot(root.get("name", ""), tuple(links), joints, roots[0])
 
 
@@ -158,19 +156,13 @@ def _text(element: ElementTree.Element, key: str, where: str) -> str:
 def pose(origin: ElementTree.Element | None, where: str) -> Pose:
     """The pose that an ``<origin>``, by default none, gives to ``where``. Raises :class:`BodyError`."""
     given = {} if origin is None else origin.attrib
-    for key in given:
-        if key not in ("xyz", "rpy", "quat_xyzw"):
-            raise BodyError(f"the origin of {where} has {shown(key)}; it may have xyz, and rpy or quat_xyzw")
+    if other := given.keys() - {"xyz", "quat_xyzw" if "quat_xyzw" in given else "rpy"}:
+        raise BodyError(f"the origin of {where} has {shown(min(other))}; it may have xyz, and rpy or quat_xyzw")
     moved = Pose.of(*(vector(origin, key, where) for key in ("xyz", "rpy")))
-    if "quat_xyzw" not in given:
-        return moved
-    if "rpy" in given:
-        raise BodyError(f"the origin of {where} has both rpy and quat_xyzw; remove one")
-    x, y, z, w = _numbers(given["quat_xyzw"], "quat_xyzw", where, 4)
-    size = math.hypot(x, y, z)
-    if math.hypot(size, w) < 1e-9:
-        raise BodyError(f"quat_xyzw of {where} is 0; its length must be 1")
-    return Pose(rotation_about(np.array((x, y, z)) / (size or 1.0), 2 * math.atan2(size, w)), moved.point_m)
+    x, y, z, w = _numbers(given.get("quat_xyzw", "0 0 0 1"), "quat_xyzw", where, 4)
+    size = math.hypot(x, y, z)  # 0 without a turn, and for ROS also where all four are 0
+    turned = rotation_about(np.array((x, y, z)) / (size or 1.0), 2 * math.atan2(size, w))
+    return Pose(moved.rotation @ turned, moved.point_m)
 
 
 def vector(element: ElementTree.Element | None, key: str, where: str, usual: str = "0 0 0") -> Vector:
