@@ -96,9 +96,22 @@ def test_missing_angle_is_named(jvrc):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('type="fixed"', 'type="floating"', "joint 'still' is of type 'floating'; it must be one of"),
+        ('type="fixed"', 'type="loose"', "joint 'still' is of type 'loose'; it must be one of"),
+        ('type="fixed"', 'type="floating"', "joint 'still' is of type 'floating'; only the single joint of the"),
+        ('<link name="a"/>', '<link name="a"/><link name="a"/>', "two links are named 'a'"),
+        ("<robot", '<robot version="1.3"', "version is '1.3'; known are 1.0, 1.1, 1.2"),
+        ('rpy="0.4 -0.5 0.6"', 'quat_xyzw="0 0 1 1"', 'quat_xyzw before URDF 1.1; write <robot version="1.1">'),
+        ('rpy="0.4 -0.5 0.6"', 'rpw="0 0 1"', "the origin of joint 'turns' has 'rpw'; it may have xyz, and rpy or"),
+        ("</robot>", '<xacro:if value="0"/></robot>', "this is xacro; expand it with `xacro FILE > expanded.urdf`"),
+        ('xyz="0 0 3"', 'xyz="0 0 ${h}"', "this is xacro; expand it with `xacro FILE > expanded.urdf`"),
+        ('type="continuous"', 'type="planar"', "joint 'follows' follows 'turns', which is not there"),
+        (KINDS, "<robot/>", "0 of its 0 links hang on no joint; a robot has one base"),
         ('<link name="a"/>', "", "joint 'turns' names the link 'a', which is not there"),
-        ('<link name="d"/>', '<link name="d"/><link name="e"/>', "2 links hang on no joint; a robot has one base"),
+        (
+            '<link name="d"/>',
+            '<link name="d"/><link name="e"/>',
+            "2 of its 6 links hang on no joint; a robot has one base",
+        ),
         ('joint="turns" multi', 'joint="follows" multi', "joint 'follows' follows itself"),
         ('xyz="0 0 3"', 'xyz="0 0 0"', "the axis of joint 'slides' has no direction"),
         ('xyz="0 0 3"', 'xyz="0 0 nan"', "joint 'slides' says 'nan' where a finite number is due"),
@@ -113,6 +126,36 @@ def test_urdf_that_cannot_be_is_refused_in_one_line(tmp_path, old, new, says):
         Kinematics(urdf.load(tmp_path / "odd.urdf"))
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+PLAIN, RPY = KINDS.encode(), b'rpy="0.4 -0.5 0.6"'
+WORLD = b'<link name="w"/><joint name="f" type="floating"><parent link="w"/><child link="base"/></joint></robot>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'<robot name="kinds"', b'\n \t<?xml version="1.0"?><robot name="kinds"'),
+        (b'<robot name="kinds"', b'\xef\xbb\xbf\n<?xml version="1.0"?><robot name="kinds" xmlns="http://a.b"'),
+        (b"</robot>", b'<gazebo><sensor:camera name="c"/></gazebo><xacro:gray/></robot>'),
+        (b"</robot>", b"<!-- a -- b --><![CDATA[<!--]]><!-- \xff \n <link/> ---></robot>"),
+        (b"</robot>", WORLD),
+        (b"</robot>", WORLD.replace(b"floating", b"planar")),
+        (PLAIN, PLAIN.replace(b"<robot", b'<robot version="1.1"').replace(RPY, b'quat_xyzw="0.1 -0.2 0.4 1.6"')),
+    ],
+)
+def test_urdf_that_ros_loads_gives_the_same_poses(tmp_path, old, new):
+    """Pinocchio reads with ROS's own parser."""
+    pinocchio = pytest.importorskip("pinocchio")
+    path = tmp_path / "kinds.urdf"
+    path.write_bytes(PLAIN.replace(old, new))
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data = model.createData()
+    pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
+    kinds = Kinematics(urdf.load(path))
+    assert (kinds.robot.links, kinds.robot.root) == (("base", "a", "b", "c", "d"), "base")
+    ours, theirs = kinds.pose("c", {"turns": 0.0, "slides": 0.0}), data.oMf[model.getFrameId("c")]
+    assert np.c_[ours.rotation, ours.point_m] == pytest.approx(theirs.homogeneous[:3], abs=1e-12)
 
 
 def test_angles_between_two_samples_are_on_the_line_between_them():

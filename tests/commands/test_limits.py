@@ -238,6 +238,14 @@ def test_very_many_elements_are_refused(tmp_path):
         urdf.load(path)
 
 
+def test_comments_without_an_end_are_quick(tmp_path):
+    path = tmp_path / "x.urdf"
+    path.write_bytes(b"<robot>" + b"<!--" * 500_000)
+    with Cost() as cost, pytest.raises(BodyError, match=f"^{path}: not a URDF file"):
+        urdf.load(path)
+    assert cost.cpu_s < 5
+
+
 # ---- meshes
 
 
@@ -279,6 +287,9 @@ def test_archives_of_meshes_are_not_unpacked(tmp_path, name):
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 3\n" * (mesh_file.MAX_TRIANGLES + 1), "500,001 triangles; the limit is"),
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 9\n", "x.obj: "),
         ("x.dae", DAE.format('<instance_node url="#n"/>' * 2).encode(), "it shows a node at several places"),
+        ("x.ply", b"0 " * 4_000_001, "more than 4,000,000 words; write it as binary STL"),
+        ("x.dae", DAE.format("0 " * 500_000 + '<instance_geometry url="#g"/>' * 5).encode(), "one part at 5 places"),
+        ("x.dae", DAE.replace("xmlns", "xmlns:n").format('<n:instance_node url="#n"/>' * 2).encode(), "several places"),
         ("x.dae", DAE.format('<instance_geometry url="#g"/>' * 900).encode(), "it shows one part at 900 places"),
         ("x.dae", b"<!DOCTYPE x>" + DAE.encode(), "it declares a document type"),
     ],
@@ -380,7 +391,7 @@ def test_the_page_on_security_states_these_limits():
         "Skin files of several sheets": (MOST_SHEETS,),
         "Robot": (mcap.MAX_LINKS, mcap.MAX_NAME),
         "URDF": (urdf.MAX_BYTES // 10**6, xmlfile.MAX_ELEMENTS, urdf.MAX_LINKS),
-        "Mesh of a robot": (mesh_file.MAX_BYTES // 10**6, mesh_file.MAX_TRIANGLES),
+        "Mesh of a robot": (mesh_file.MAX_BYTES // 10**6, mesh_file.MAX_TRIANGLES, *mesh_file.MAX_WORDS.values()),
         "Recording (MCAP)": (
             *(mcap.LARGEST >> 20, mcap.FREE >> 20, mcap.RATIO, mcap.LEAST >> 10),
             *(mcap.MAX_LINKS, mcap.MAX_NAME, mcap.MAX_TEXTS),

@@ -126,10 +126,15 @@ def test_command_writes_a_table_that_loads(tube, tmp_path, capsys):
     assert read.place(0.0, 0.0)[0] == pytest.approx(tuple(POSE.apply(np.array([45.0, 0, 0]))), abs=0.02)
 
 
+METERS = "the mesh spans 400 mm, the sheet 4500; a mesh in m needs --scale 1000"
+
+
 @pytest.mark.parametrize(
     ("sheet", "by", "says"),
     [
         (laid(40, 8, 10.0, 10.0), "unrolled", "column 0 is 390 mm long; the mesh ends after 1"),
+        (laid(4, 9, 500.0, 10.0), "unrolled", METERS),
+        (laid(9, 4, 10.0, 500.0), "projected", METERS),
         (laid(4, 40, 10.0, 10.0), "unrolled", "row 0: 40 columns are longer than the 282.7 mm around it"),
         (laid(4, 4, 10.0, 10.0, Pose.of((0, 0, 999.0))), "unrolled", "column 0 does not meet the mesh at row 0"),
         (
@@ -160,6 +165,40 @@ def test_files_that_are_no_tables_or_meshes_are_refused_in_one_line(tmp_path, ca
     np.savez(tmp_path / "object.npz", points_mm=np.array([{}], object))
     with pytest.raises(SurfaceError, match=r"not a table of `contactfpga body surface`"):
         Mesh.load(tmp_path / "object.npz")
+
+
+def test_objects_are_read_however_they_are_written(tmp_path):
+    """Indices are relative to the vertices so far: counted from the end, the first part would lie on the second."""
+    parts = [trimesh.creation.box((size, size, 1)) for size in (10, 30)]
+    text = "\ufeffv 7 7 7\n"
+    for part in parts:
+        text += "".join(f" \tv\t{x}  {y} {z} # 1 2\r\n" for x, y, z in part.vertices)
+        text += "".join(f"f\t{a - 8}/1 {b - 8}//-1 \\\n{c - 8} # 9\n" for a, b, c in part.faces)
+    (tmp_path / "parts.obj").write_text(f"{text}v nan inf 1e300\rf 2 3 5 4\n", encoding="utf-8")
+    triangles = Triangles.load(tmp_path / "parts.obj").corners_mm
+    quad = parts[0].vertices[[[0, 1, 3], [0, 3, 2]]]
+    assert np.array_equal(triangles, np.concatenate([*(part.triangles for part in parts), quad]))
+
+
+SOLID = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.obj", b"v 1,5 2,5 0", "line 'v 1,5 2,5 0' must have three numbers with decimal points"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0", "a triangle has a corner that is none of its 3"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nf 0 1 2\nv 0 1 0", "a triangle has a corner that is none of its 3"),
+        ("a.stl", SOLID.replace("1 0 0", "1,0 0 0").encode(), "line 'vertex 1,0 0 0' must have three numbers"),
+        ("a.stl", f"{SOLID}endsolid\n{SOLID}".encode(), "it ends within a solid, so a part is missing"),
+        ("a.stl", bytes(80) + b"\2\0\0\0" + bytes(103), "187 bytes; its 2 triangles would take 184; export it"),
+    ],
+)
+def test_a_mesh_that_is_not_plain_is_refused_with_what_is_wrong(tmp_path, name, data, says):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(SurfaceError) as error:
+        Triangles.load(tmp_path / name)
+    assert str(error.value).startswith(f"{tmp_path / name}: {says}")
 
 
 def test_meshes_that_are_damaged_are_refused_without_a_traceback_of_their_reader(tube, tmp_path, python):

@@ -58,10 +58,9 @@ def stage(request, tmp_path):
 
 
 def test_meshes_are_found_with_their_places(tmp_path, stage):
-    (found,) = robot_stage.visuals(tmp_path / "arm.urdf")
-    assert (found.link, found.path.name, found.scale) == ("arm", "arm.stl", (2.0, 1.0, 1.0))
+    found, _ = robot_stage.visuals(tmp_path / "arm.urdf")
+    assert (found.link, found.name, found.scale) == ("arm", "arm.stl", (2.0, 1.0, 1.0))
     np.testing.assert_allclose(found.pose.apply(np.array([1.0, 0.0, 0.0])), [0.1, 1.0, 0.0], atol=1e-6)
-    assert stage[0].unread == set()
 
 
 def test_the_mouse_meets_a_sheet_where_the_joints_put_it(stage):
@@ -78,18 +77,19 @@ def test_the_mouse_meets_a_sheet_where_the_joints_put_it(stage):
     assert sheet._met([0.01, 0.03, 9.0], np.array([0.0, 0.0, -1.0])) == pytest.approx((x_mm, 30.0))
 
 
-def test_a_mesh_that_cannot_be_read_is_said(tmp_path, stage):
-    path = tmp_path / "broken.dae"
-    path.write_text("no mesh")
-    visual = robot_stage.visuals(tmp_path / "arm.urdf")[0]
-    stage[0]._add_mesh(robot_stage.Visual("arm", visual.pose, path, (1.0, 1.0, 1.0)))
-    assert stage[0].unread == {".dae"}
-
-
-def test_a_mesh_of_a_package_that_is_not_installed_is_left_out(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(URDF.replace("arm.stl", "package://nobodys_description/meshes/arm.stl"))
-    assert robot_stage.visuals(path) == []
+def test_meshes_that_are_not_drawn_are_told(tmp_path, stage):
+    (tmp_path / "broken.stl").write_text(TETRAHEDRON.replace("1", "nan") + "endsolid a\n")
+    mesh = '<visual><geometry><mesh filename="{}.stl"/></geometry></visual>'
+    meshes = "".join(map(mesh.format, ("broken", "package://nobodys_description/a", "b", "c", "c", "d")))
+    world = '<joint name="f" type="floating"><parent link="w"/><child link="base"/></joint>'
+    world += f'<link name="w">{mesh.format("arm")}</link></robot>'
+    (tmp_path / "arm.urdf").write_text(URDF.replace("</link>", f"{meshes}</link>").replace("</robot>", world))
+    shown = robot_stage.RobotStage(stage[0]._server, Body.load(tmp_path / "robot.toml"), node="/other")
+    missing = "'not there.stl', 'package://nobodys_description/a.stl', 'b.stl', ..."
+    rest = "1 unreadable: 'broken.stl'; lines between joints are drawn"
+    assert shown.left_out() == f"5 {robot_stage.MISSING}: {missing}; {rest}"
+    shown.move({"elbow": 0.0})
+    assert np.isfinite(shown.points_m()).all()
 
 
 @pytest.mark.parametrize(("old", "new"), [('xyz="0.1 0 0"', 'xyz="0.1 0"'), ('scale="2 1 1"', 'scale="big"')])
@@ -145,8 +145,8 @@ def test_a_robot_without_joints_is_shown(tmp_path):
 def test_meshes_beyond_a_limit_are_left_out_and_told(tmp_path, stage, monkeypatch):
     shown, _ = stage
     monkeypatch.setattr(robot_stage, "MAX_MESHES", 2)
-    (visual,) = robot_stage.visuals(tmp_path / "arm.urdf")
+    visual, _ = robot_stage.visuals(tmp_path / "arm.urdf")
     shown._add_mesh(visual)
-    assert shown.unread == set()
+    assert robot_stage.REST not in shown.left_out()
     shown._add_mesh(visual)
-    assert shown.unread == {robot_stage.REST}
+    assert f"1 {robot_stage.REST}: 'arm.stl'" in shown.left_out()

@@ -14,6 +14,7 @@ from contactfpga.surfaces.shapes import Floats, SurfaceError
 
 FINE = 8
 CHUNK = 2_000_000
+MARGIN_MM = 1.0
 EDGE = 0.8
 """Cosine of the angle from which two triangles form an edge, not a round surface."""
 MAX_AROUND = 20_000_000
@@ -33,8 +34,6 @@ class Triangles:
         :class:`SurfaceError`, OSError."""
         mesh = mesh_file.read(path, "surface")
         corners = np.asarray(mesh.triangles, float)
-        if wrong := int((~np.isfinite(corners)).any(axis=(1, 2)).sum()):
-            raise SurfaceError(f"{path}: {wrong} of its {len(corners)} triangles have a corner that is no point")
         mesh.merge_vertices()
         return cls(scale * corners, _corner_normals(mesh))
 
@@ -76,7 +75,7 @@ class Triangles:
     def size_mm(self) -> float:
         """An upper bound on the distance of corners."""
         spread = self.corners_mm.reshape(-1, 3)
-        return float(np.linalg.norm(spread.max(axis=0) - spread.min(axis=0))) + 1.0
+        return float(np.linalg.norm(spread.max(axis=0) - spread.min(axis=0))) + MARGIN_MM
 
 
 def _corner_normals(mesh: Any) -> Floats:
@@ -112,6 +111,7 @@ class Placement:
 
     def projected(self, mesh: Triangles) -> Mesh:
         """The flat sheet projected against z onto the mesh; distances grow on steep parts."""
+        self._check_size(mesh)
         x, y = np.meshgrid(np.arange(self.columns) * self.pitch_x_mm, np.arange(self.rows) * self.pitch_y_mm)
         flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
         down = -self.rotation[:, 2]
@@ -122,6 +122,7 @@ class Placement:
     def unrolled(self, mesh: Triangles, *, closed: bool = False) -> Mesh:
         """The sheet unrolled around z: column 0 goes up along z on the x side, row 0 around from there. Cells are a
         pitch apart on the mesh; columns of a closed sheet share the circumference evenly."""
+        self._check_size(mesh)
         heights = self._heights(mesh)
         points, normals = np.empty((2, self.rows, self.columns, 3))
         # An arc is found between rays: fine enough that its chord is no shorter by more than a few parts in 10,000.
@@ -139,6 +140,11 @@ class Placement:
             at = np.interp(np.arange(self.columns) * pitch, ways, angles)
             points[row], normals[row] = self._seen(mesh, at, np.full(self.columns, height))
         return self._table(points, normals, closed=closed)
+
+    def _check_size(self, mesh: Triangles) -> None:
+        sheet = max(self.rows * self.pitch_y_mm, self.columns * self.pitch_x_mm)
+        if (across := mesh.size_mm - MARGIN_MM) < sheet / 10:  # which may go around, but not so often
+            raise SurfaceError(f"the mesh spans {across:.3g} mm, the sheet {sheet:g}; a mesh in m needs --scale 1000")
 
     def _heights(self, mesh: Triangles) -> Floats:
         far = (self.rows - 1) * self.pitch_y_mm

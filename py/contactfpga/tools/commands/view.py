@@ -45,6 +45,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from contactfpga.tools.view import opening
+    from contactfpga.tools.view.bodies import RobotView
     from contactfpga.tools.view.playback import Player
 
     if args.mujoco is not None:
@@ -69,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
         terminal.say(f"Open {shown.url}")
         can = "see the recording" if isinstance(shown.source, Player) else "read and press"
         terminal.say(f"Whoever has this address can {can}. Ctrl-C ends it.", hang=2)
+        if isinstance(shown.view, RobotView) and (left_out := shown.view.stage.left_out()):
+            terminal.say(f"meshes: {left_out}", hang=2)
         if not args.no_browser and _has_display():
             opening.browse(shown.url)
         opening.run(shown, args.seconds)

@@ -219,12 +219,12 @@ class BodyView(RobotView):
             self._timeline.write()
 
     def facts(self) -> list[tuple[str, str]]:
-        source, unread = self._source, self.stage.unread
+        source = self._source
         rows = [("source", shortened(source.title))]
         if isinstance(source, Playback):
             rows.append(("moment", f"{source.position_s:.3f} of {source.duration_s:.3f} s"))
-        if unread:
-            rows.append(("meshes", f"{', '.join(sorted(unread))} cannot be read; lines between joints are drawn"))
+        if left_out := self.stage.left_out():
+            rows.append(("meshes", left_out))
         return rows + [(name, told(state)) for name, state in self._states.items()]
 
 

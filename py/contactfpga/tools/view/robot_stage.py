@@ -33,45 +33,41 @@ MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
 MAX_MESHES = 1000
 MAX_MESH_BYTES = 100_000_000
 """Most bytes of all meshes of a robot."""
-REST = "what is beyond the limit of all meshes"
+REST = "beyond the limit of all meshes"
+MISSING = "not found, from the URDF's folder or in an installed Python package"
+NAMED = 3
+"""Most names of meshes that are told."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Visual:
     link: str
     pose: Pose
-    path: Path
+    name: str
+    """Of the mesh's file, as in the URDF."""
+    folder: Path
+    """Of the URDF."""
     scale: tuple[float, float, float]
 
 
 def visuals(urdf: Path) -> list[Visual]:
-    """The existing meshes of a URDF, without boxes, spheres and cylinders. Raises :class:`BodyError`, OSError."""
-    found = []
+    """The meshes of a URDF, without boxes, spheres and cylinders. Raises :class:`BodyError`, OSError."""
     links = urdf_file.tree(urdf).findall("link")
     try:
-        for link in links:
-            found += [_visual(one, link.get("name", ""), urdf.parent) for one in link.findall("visual")]
+        return [
+            _visual(one, mesh, link.get("name", ""), urdf.parent)
+            for link in links
+            for one in link.findall("visual")
+            if (mesh := one.find("geometry/mesh")) is not None
+        ]
     except BodyError as error:
         raise BodyError(f"{urdf}: {error}") from None
-    return [visual for visual in found if visual is not None]
 
 
-def _visual(element: ElementTree.Element, link: str, folder: Path) -> Visual | None:
-    mesh = element.find("geometry/mesh")
-    path = None if mesh is None else _path(mesh.get("filename", ""), folder)
-    if path is None:
-        return None
-    where, origin = f"a mesh of link {shown(link)}", element.find("origin")
-    shift, turn = (urdf_file.vector(origin, key, where) for key in ("xyz", "rpy"))
-    return Visual(link, Pose.of(shift, turn), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
-
-
-def _path(name: str, folder: Path) -> Path | None:
-    try:
-        path = urdf_file.located(name.removeprefix("file://"), folder)
-    except BodyError:  # of a package that is not installed: the sheets can be shown all the same
-        return None
-    return path if path.is_file() else None
+def _visual(element: ElementTree.Element, mesh: ElementTree.Element, link: str, folder: Path) -> Visual:
+    where = f"a mesh of link {shown(link)}"
+    pose, scale = urdf_file.pose(element.find("origin"), where), urdf_file.vector(mesh, "scale", where, "1 1 1")
+    return Visual(link, pose, mesh.get("filename", ""), folder, scale)
 
 
 class RobotStage:
@@ -83,8 +79,8 @@ class RobotStage:
         self._root = server.scene.add_frame(node, show_axes=False)
         self.at_m = np.zeros(3)
         self._frames: dict[str, Any] = {}
-        self.unread: set[str] = set()
-        """Kinds of unreadable mesh files."""
+        self._left_out: dict[str, dict[str, None]] = {}
+        """Names of meshes that are not drawn, by the reason."""
         self._meshes = self._mesh_bytes = self._triangles = 0
         self._corners: list[tuple[str, np.ndarray]] = []
         """Corners of a box around each link's mesh, (8, 3) in m in the link's frame."""
@@ -99,7 +95,8 @@ class RobotStage:
         for name in dict.fromkeys(names):
             self._frames[name] = scene.add_frame(f"{self._node}/{name}", show_axes=False)
         for visual in visuals(body.urdf) if body.urdf is not None and not solids else ():
-            self._add_mesh(visual)
+            if visual.link in self._frames:  # and not the world under a base that moves freely
+                self._add_mesh(visual)
         for solid in solids:
             self._add(solid)
         self.stages = {name: self._add_sheet(plan) for name, plan in body.links.items()}
@@ -109,20 +106,30 @@ class RobotStage:
 
     def _add_mesh(self, visual: Visual) -> None:
         try:
+            path = urdf_file.located(visual.name.removeprefix("file://"), visual.folder)
+            self._mesh_bytes += path.stat().st_size
             self._meshes += 1
-            self._mesh_bytes += visual.path.stat().st_size
             if self._meshes > MAX_MESHES or self._mesh_bytes > MAX_MESH_BYTES:
                 raise SurfaceError(REST)
-            mesh = mesh_file.read(visual.path, "view", MESHES)
+            mesh = mesh_file.read(path, "view", MESHES)
             self._triangles += len(mesh.faces)
             if self._triangles > mesh_file.MAX_TRIANGLES:
                 raise SurfaceError(REST)
-        except (SurfaceError, OSError) as error:
-            self.unread.add(REST if str(error) == REST else visual.path.suffix)
+        except (BodyError, SurfaceError, OSError) as error:  # the sheets can be shown all the same
+            reason = REST if str(error) == REST else "unreadable" if isinstance(error, SurfaceError) else MISSING
+            self._left_out.setdefault(reason, {})[shown(visual.name)] = None
             return
         mesh.merge_vertices()
         vertices, faces = np.asarray(mesh.vertices) * visual.scale, np.asarray(mesh.faces)
         self._add(Solid(visual.link, visual.pose, vertices, faces, rgb(picture_style.SHEET)))
+
+    def left_out(self) -> str:
+        """Which meshes are not drawn, and why; empty if all are."""
+        told = "".join(
+            f"{len(names)} {reason}: {', '.join(list(names)[:NAMED])}{', ...' if len(names) > NAMED else ''}; "
+            for reason, names in self._left_out.items()
+        )
+        return f"{told}lines between joints are drawn" if told else ""
 
     def _add(self, solid: Solid) -> None:
         box = np.array(list(itertools.product(*zip(solid.vertices_m.min(0), solid.vertices_m.max(0)))))
