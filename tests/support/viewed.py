@@ -29,7 +29,7 @@ class Page:
         for message in messages:
             self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict([])))
 
-    def hear(self, wanted, seconds=60.0):
+    def hear(self, wanted, seconds=180.0):
         """Until a message is ``wanted``, which is returned."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
