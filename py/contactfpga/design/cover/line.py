@@ -28,7 +28,7 @@ def read(path: str | Path) -> tuple[Floats, Floats]:
     """Forces in N and deformations in m from a file with two comma-separated columns; a header is optional."""
     rows: list[list[float]] = []
     with open_regular(path) as file:
-        lines = file.read().decode(errors="replace").splitlines()
+        lines = file.read().decode("utf-8-sig", errors="replace").splitlines()
     for number, text in enumerate(lines, 1):
         cells = [cell.strip() for cell in text.split(",")]
         if not text.strip() or text.startswith("#"):
