@@ -85,8 +85,7 @@ def _is_text(data: bytes, path: Path) -> bool:
 def _text(data: bytes, path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3) vertices and (m, 3) faces of an OBJ or STL file. The library takes minutes for thousands of groups,
     which are irrelevant, and counts relative indices from the end of the file."""
-    vertices, faces = array.array("d"), array.array("q")
-    vertex = b"v" if kind == ".obj" else b"vertex"
+    vertices, faces, vertex = array.array("d"), array.array("q"), b"v" if kind == ".obj" else b"vertex"
     plain = data.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\\\n", b" ")
     for line in io.BytesIO(plain):
         key, *words = line.partition(b"#")[0].lower().split() or (b"",)
@@ -119,6 +118,5 @@ def _check_collada(data: bytes, path: Path, words: int) -> None:
             raise SurfaceError(f"{path}: it shows a node at several places; export it as one mesh")
         if name in ("instance_geometry", "instance_controller"):
             places[element.get("url", "")] += 1
-    most = max(places.values(), default=0)
-    if most * len(data) > MAX_BYTES or most * words > MAX_WORDS[COLLADA]:
+    if (most := max(places.values(), default=0)) * len(data) > MAX_BYTES or most * words > MAX_WORDS[COLLADA]:
         raise SurfaceError(f"{path}: it shows one part at {most:,} places; export it as one mesh")

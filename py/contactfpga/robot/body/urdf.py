@@ -100,7 +100,9 @@ def _robot(root: ElementTree.Element) -> Robot:
             raise BodyError(f"joint {shown(joint.name)} follows {shown(joint.mimic[0])}, which is not there")
     roots = list(set(links).difference(joint.child for joint in joints.values()))
     if len(roots) != 1:
-        raise BodyError(f"{len(roots)} of its {len(links)} links hang on no joint; a robot has one base")
+        raise BodyError(
+            f"{len(roots)} links hang on no joint; a robot has one base" if links else "no link; is it xacro?"
+        )
     return Robot(root.get("name", ""), tuple(links), joints, roots[0])
 
 
