@@ -138,6 +138,7 @@ def same(page, count, dead=np.s_[:0]):
 def test_it_is_small_and_soon_ready(file, chromium, record_property):
     assert file.stat().st_size <= MOST_BYTES
     page = chromium.new_page()
+    page.set_default_timeout(PATIENCE_MS)
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
     page.goto(file.as_uri())
