@@ -118,7 +118,7 @@ def test_line_of_measured_points(tmp_path, header):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("\ufeff1,2\n3,4\n", "2 points; a line with a correlation needs 3"),
+        ("1,2\n3,4\n", "2 points; a line with a correlation needs 3"),
         ("1,2\n3,x\n", "line 2: '3,x' is not two numbers, force in N and deformation in m"),
         ("1,2\n3,4,5\n", "line 2: '3,4,5' is not two numbers"),
         ("1,2\n3,nan\n", "line 2: '3,nan' is not two numbers"),
