@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError
@@ -96,6 +96,7 @@ def documents(draw):
 
 
 @given(documents())
+@example((f'k0 = """"""\nk1{".a" * 16} = ""\n', 17))  # Python 3.11.2 took all of it for one string
 @settings(max_examples=150, deadline=None)
 def test_only_keys_of_many_parts_are_refused(document):
     """Whatever stands in strings and comments; the parser says what a text is."""

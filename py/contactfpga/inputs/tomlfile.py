@@ -19,11 +19,13 @@ MAX_DEPTH = 16
 """Most nested tables and lists, and parts of a dotted key, whose parsing time is quadratic."""
 
 _NO_KEY = re.compile(
-    r'''"""(?:[^\\"]|\\.|"(?!""))*+(?:"""|\Z)|'{3}(?:[^']|'(?!''))*+(?:'{3}|\Z)'''
-    r"""|"(?:[^\\"\n]|\\.)*+"?|'[^'\n]*+'?|\#[^\n]*+""",
+    r'''"""(?:[^\\"]++|\\(?:.|\Z)|"(?!""))*(?:"""|\Z)|'{3}(?:[^']++|'(?!''))*(?:'{3}|\Z)'''
+    r"""|"(?:[^\\"\n]++|\\.)*"?|'[^'\n]*+'?|\#[^\n]*+""",
     re.DOTALL,
 )
-"""Strings and comments, also unterminated ones."""
+"""Strings and comments, also unterminated ones, each matched at the first try. Before Python 3.11.5 a possessive
+quantifier of a group with alternatives may match too much.
+"""
 _LONG_KEY = re.compile(rf"\.(?:[^.=,{{}}\[\]\n]*+\.){{{MAX_DEPTH - 1}}}")
 
 
