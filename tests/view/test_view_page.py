@@ -93,16 +93,15 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     shown.hand.click(30, 50)
     shown.hand.click(30, 110)
     visitor.page.wait_for_selector("text=2 contacts", timeout=120_000)
-    width, height, shown_wide = visitor.page.evaluate(
-        "[window.__viserMutable.canvas.width, window.__viserMutable.canvas.height, window.box()[2]]"
-    )
+    _, _, shown_wide, shown_high = visitor.page.evaluate("window.box()")
     with visitor.page.expect_download(timeout=120_000) as kept:
         visitor.page.keyboard.press("p")
     kept.value.save_as(tmp_path / "kept.png")
     assert kept.value.suggested_filename == "contactfpga.png"
     wide, high = struct.unpack(">II", (tmp_path / "kept.png").read_bytes()[16:24])
-    assert wide == width
-    assert high == pytest.approx(height + 4 * 1.6 * 14 * width / shown_wide, abs=2)
+    scale = wide / shown_wide  # a slow computer draws fewer pixels
+    assert high == pytest.approx(scale * (shown_high + 4 * 1.6 * 14), abs=2)
+    assert 0.25 < scale < 1.01
     visitor.page.keyboard.press("l")
     visitor.page.wait_for_selector("text=Nothing touches", timeout=120_000)
     assert shown.hand.fingers == []
