@@ -49,7 +49,7 @@ def guard(board: contactfpga.Board, step: Callable[[], None], brake: Callable[[]
 
 
 def watch(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
-    """Call ``step`` every PERIOD_S until a frame, or that none comes, is a reason to stop."""
+    """Call ``step`` every PERIOD_S until a frame, or its absence, is a reason to stop."""
     heard_s = due_s = board.clock()
     while True:
         step()

@@ -354,7 +354,7 @@ CHANGES = {
 
 @pytest.mark.parametrize(("skin", "changed"), [(skin, one) for skin, found in CHANGES.items() for one in found])
 def test_a_sheet_that_is_another_by_one_field_is_a_change(decoder, skin, changed):
-    """Also where the fingerprint is that of before; times and counts then begin anew."""
+    """A hello with one other field is another Skin, even if its fingerprint is the same: times and counts restart."""
     wire = ModelBoard(skin).wire
     other = ModelBoard(skin.replace(**changed)).wire.facts() | {FINGERPRINT: wire.known.fingerprint}
     if not changed:

@@ -288,7 +288,7 @@ def test_archives_of_meshes_are_not_unpacked(tmp_path, name):
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 3\n" * (mesh_file.MAX_TRIANGLES + 1), "500,001 triangles; the limit is"),
         ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 9\n", "x.obj: "),
         ("x.dae", DAE.format('<instance_node url="#n"/>' * 2).encode(), "it shows a node at several places"),
-        ("x.ply", b"0 " * 4_000_001, "more than 4,000,000 words; write it as binary STL"),
+        ("x.ply", b"0 " * 4_000_001, "4,000,001 words; the limit is 4,000,000. Write it as binary STL"),
         ("x.dae", DAE.format("0 " * 500_000 + '<instance_geometry url="#g"/>' * 5).encode(), "one part at 5 places"),
         ("x.dae", DAE.replace("xmlns", "xmlns:n").format('<n:instance_node url="#n"/>' * 2).encode(), "several places"),
         ("x.dae", DAE.format('<instance_geometry url="#g"/>' * 900).encode(), "it shows one part at 900 places"),

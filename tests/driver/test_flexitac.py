@@ -240,7 +240,7 @@ def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, 
         return caught.value
 
     with FlexitacSheet(Touch(), **sheet) as sent:
-        found = patiently(raised, lambda found: said in str(found), (0.2, 2.0, 9.0))
+        found = patiently(raised, lambda found: said in str(found), (0.2, 2.0, 9.0, 60.0))
     assert said in str(found)
     assert type(found) is error
     assert "hello" not in str(found)

@@ -66,7 +66,7 @@ class Two(wiring.Component):
     """A board that restarts in the clock after ``now``, and one that stays in reset until ``begins``."""
 
     KEPT: ClassVar = {"reset": (), "dual": (), "flip": ("contact", "alive", "m_axis_records_")}
-    """Beginnings of the names of outputs that a restart of this kind does not start anew."""
+    """First parts of the names of outputs that a restart of this kind does not reset."""
 
     def __init__(self, skin: Skin, kind: str):
         self.kind = kind

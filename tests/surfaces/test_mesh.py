@@ -180,6 +180,11 @@ def test_objects_are_read_however_they_are_written(tmp_path):
     assert np.array_equal(triangles, np.concatenate([*(part.triangles for part in parts), quad]))
 
 
+def test_the_name_of_a_solid_is_no_corner(tmp_path):
+    (tmp_path / "vertex.stl").write_text(f"{SOLID.replace('solid a', 'solid vertex')}endsolid vertex\n")
+    assert Triangles.load(tmp_path / "vertex.stl").corners_mm.tolist() == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+
+
 SOLID = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
 
 

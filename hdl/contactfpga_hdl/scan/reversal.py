@@ -75,7 +75,7 @@ class ReversalScanner(wiring.Component):
             read.eq(rows & sum(1 << row for row in range(skin.rows) if present(skin, row))),
             cycle.touched.eq(read | (self.busy if self.derived.debounced else 0)),
             cycle.packed.eq(self.packed),
-            cycle.wanted.eq(clock.waiting | self.due | self._news(m) if skin.send == "on_change" else 1),
+            cycle.wanted.eq(clock.waiting | self.due | self._fault_changed(m) if skin.send == "on_change" else 1),
             self.stuck.eq(precharge.held[: skin.columns].any()),
         ]
         if moves_sample(self.derived):
@@ -92,12 +92,12 @@ class ReversalScanner(wiring.Component):
             self._test_lines(m, cycle, test, read, pressed)
         return m
 
-    def _news(self, m: Module) -> Value:
-        """Whether what is known of faults differs from the last frame's flag. It may be late by a clock: between two
-        beginnings of frames are more."""
-        news = Signal()
-        m.d.sync += news.eq((self.stuck | self._told) ^ self.tag.fault)
-        return news
+    def _fault_changed(self, m: Module) -> Value:
+        """Whether any fault is known now, but not in the last frame's flag, or the other way round. It is late by a
+        clock, which is less than the least distance of two frames."""
+        changed = Signal()
+        m.d.sync += changed.eq((self.stuck | self._told) ^ self.tag.fault)
+        return changed
 
     @property
     def _told(self) -> Value:
@@ -176,8 +176,7 @@ class ReversalScanner(wiring.Component):
         ]
         with m.If(cycle.strobe):
             m.d.sync += self.sampled.eq(clock.time)
-        at_begin = Signal()
-        counted = Signal(2)  # the last bit: the columns are counted in the next clock
+        at_begin, counted = Signal(), Signal(2)  # the last bit: the columns are counted in the next clock
         if "faults" in self.signature.members:
             m.d.sync += counted.eq(Cat(cycle.begins, counted))
             with m.If(counted[1]):

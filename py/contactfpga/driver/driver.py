@@ -165,7 +165,7 @@ def _forget(port: str | None, board: Board | None = None) -> None:
 
 
 def _given_back() -> bool:
-    """Whether boards were closed that nobody else uses."""
+    """Close the boards that nothing else uses, and the links of dropped boards. Return whether there was one."""
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)

@@ -19,7 +19,7 @@ from contactfpga.zones.units import UnitHistory
 
 
 class UnknownSkin(ContactFPGAError, AttributeError):
-    """Of the board's Skin only the sheet is known."""
+    """The whole Skin of a board is not known, only its sheet."""
 
 
 class BoardFacts:

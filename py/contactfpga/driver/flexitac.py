@@ -211,7 +211,7 @@ class FlexitacPort:
 
 
 def _usual_gap(data: bytes) -> int:
-    """The distance of most marks from the next one; 0 where there is none."""
+    """The most frequent distance in bytes from one mark to the next; 0 if it is not that of half of them."""
     places = [found.start() for found in re.finditer(re.escape(MARK), data)]
     gaps = Counter(later - earlier for earlier, later in pairwise(places))
     ((gap, count),) = gaps.most_common(1) or [(0, 0)]

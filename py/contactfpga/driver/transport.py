@@ -38,7 +38,7 @@ OPENED_BY_NAME = {Replay: "replay", Net: "zenoh", Flexitac: "flexitac"}
 CHUNK = 65_536
 
 STEP_S, MOMENT_S = 0.5e-3, 2e-3
-"""Of a paced virtual board: real time between looks at the clock, most simulated time of a read."""
+"""Real seconds between two looks of a paced virtual board at the clock, and most simulated seconds of one read."""
 LAG_S = 0.1
 """Largest lag of a paced virtual board that is caught up."""
 

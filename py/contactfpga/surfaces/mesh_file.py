@@ -49,7 +49,9 @@ def read(path: str | Path, extra: str, suffixes: tuple[str, ...] = SUFFIXES) -> 
     data = read_small(path, MAX_BYTES, "a mesh? Fewer triangles are enough", SurfaceError)
     words, most = sum(len(line.split()) for line in io.BytesIO(data)), MAX_WORDS.get(kind, len(data))
     if words > most:
-        raise SurfaceError(f"{path}: more than {most:,} words; write it as binary STL, or simplify the mesh")
+        raise SurfaceError(
+            f"{path}: {words:,} words; the limit is {most:,}. Write it as binary STL, or simplify the mesh"
+        )
     if kind == COLLADA:
         _check_collada(data, path, words)
     text = _text(data, path, kind) if kind == ".obj" or (kind == ".stl" and _is_text(data, path)) else None
@@ -78,7 +80,9 @@ def _is_text(data: bytes, path: Path) -> bool:
     stated = int.from_bytes(data[80:84], "little")
     is_text = len(data) != (size := 84 + 50 * stated)
     if is_text and stated and b"vertex" not in data.lower():
-        raise SurfaceError(f"{path}: {len(data):,} bytes; its {stated:,} triangles would take {size:,}; export it anew")
+        raise SurfaceError(
+            f"{path}: {len(data):,} bytes; its {stated:,} triangles would take {size:,}; export it again"
+        )
     return is_text
 
 
@@ -87,12 +91,15 @@ def _text(data: bytes, path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     which are irrelevant, and counts relative indices from the end of the file."""
     vertices, faces, vertex = array.array("d"), array.array("q"), b"v" if kind == ".obj" else b"vertex"
     plain = data.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\\\n", b" ")
+    ended = 0  # numbers of vertices in solids that have an end
     for line in io.BytesIO(plain):
         key, *words = line.partition(b"#")[0].lower().split() or (b"",)
         try:
             if key == vertex:
                 x, y, z = map(float, words[:3])
                 vertices.extend((x, y, z))
+            elif key == b"endsolid":
+                ended = len(vertices)
             elif key == b"f":
                 told = [int(word.partition(b"/")[0]) for word in words]
                 first, *others = (one - 1 if one >= 0 else one + len(vertices) // 3 for one in told)
@@ -101,8 +108,8 @@ def _text(data: bytes, path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
             due = "three numbers with decimal points" if key == vertex else "whole numbers, of vertices"
             raise SurfaceError(f"{path}: line {shown(line.strip().decode(errors='replace'))} must have {due}") from None
     if kind == ".stl":
-        if vertex in data.lower().rpartition(b"endsolid")[2] or len(vertices) % 9:
-            raise SurfaceError(f"{path}: it ends within a solid, so a part is missing; export it anew")
+        if len(vertices) > ended or len(vertices) % 9:
+            raise SurfaceError(f"{path}: it ends within a solid, so a part is missing; export it again")
         faces.extend(range(len(vertices) // 3))
     return np.array(vertices).reshape(-1, 3), np.array(faces).reshape(-1, 3)
 

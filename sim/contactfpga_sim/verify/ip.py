@@ -29,7 +29,7 @@ from contactfpga_sim.model.golden.trace import Timeline
 from contactfpga_sim.verify.cosim.record import InputDriver
 
 NAME = "contactfpga_core"
-"""Of the module, and the beginning of all other modules' names, if no other is given."""
+"""Default name of the core's module. The names of all other modules begin with it."""
 MOST_LETTERS = 64
 SCANS = 4
 """Scans in the vectors after the hello."""

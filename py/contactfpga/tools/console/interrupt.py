@@ -32,7 +32,7 @@ AGAIN_S = 0.01
 _came: int | None = None
 """The signal since the command began, unless it was the normal end."""
 _run: object = None
-"""The run of a command that a signal should end; None: there is none."""
+"""Identity of the running command that a signal should end; None while no command runs."""
 
 
 class Interruption(KeyboardInterrupt):

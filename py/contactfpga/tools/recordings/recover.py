@@ -201,7 +201,7 @@ def _magic(file: BinaryIO, at: int) -> bool:
 
 
 def _places(file: BinaryIO) -> list[int]:
-    """Where chunks begin, and the summary, if the file has an index of all."""
+    """Offsets in bytes of the chunks and of the summary; empty if the file has no complete index."""
     with contextlib.suppress(Unreadable):
         index = Index(file)
         return sorted({*(place.at for place in index.places), index.summary} - {0})

@@ -36,7 +36,7 @@ MAX_MESH_BYTES = 100_000_000
 REST = "beyond the limit of all meshes"
 MISSING = "not found, from the URDF's folder or in an installed Python package"
 NAMED = 3
-"""Most names of meshes that are told."""
+"""Most names of meshes in a message, for each reason."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,9 +44,9 @@ class Visual:
     link: str
     pose: Pose
     name: str
-    """Of the mesh's file, as in the URDF."""
+    """File name of the mesh, as in the URDF."""
     folder: Path
-    """Of the URDF."""
+    """Folder of the URDF."""
     scale: tuple[float, float, float]
 
 

@@ -209,7 +209,7 @@ class SimulatedSource:
         self.sweep.add(self.simulated_s, [max(map(copy.force_n, copy.sheets)) for copy in self.copies])
 
     def _check(self, data: Any) -> None:
-        """Raises :class:`~contactfpga.ContactFPGAError` where MuJoCo warned, which may have begun anew."""
+        """Raises :class:`~contactfpga.ContactFPGAError` after a warning of MuJoCo, which may have reset its state."""
         import mujoco
 
         if (warned := np.flatnonzero(data.warning.number)).size:

@@ -138,8 +138,8 @@ class ReversalScanModel:
             check = max(self.checks.asked, begin) if self.checks else wanted + 1
             until = min(wanted, check)
             self._held.rests(begin, until)
-            if (news := self._news(max(self._packed, begin), until)) < until:
-                wanted = until = news
+            if (changed := self._fault_change(max(self._packed, begin), until)) < until:
+                wanted = until = changed
                 self._held.cut(until)
             touched = self._first_touched(begin - 2, until - 2)
             test = self._test_asked(begin, until if touched is None else touched + 1)
@@ -180,7 +180,7 @@ class ReversalScanModel:
         self._told.change(cycle, self._word)
         self._stages.tell(cycle, self._word)
 
-    def _news(self, begin: int, end: int) -> int:
+    def _fault_change(self, begin: int, end: int) -> int:
         """First cycle from ``begin`` on after one in which what is known of faults differs from the last flag, or
         ``end``; reported lines do not change later than in ``begin``."""
         if self._facts.skin.send == "always":
