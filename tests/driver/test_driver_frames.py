@@ -321,8 +321,8 @@ def test_a_board_that_nobody_holds_gives_its_port_back(board):
 
 
 def test_a_board_that_was_dropped_is_opened_again_at_once(board):
-    for _ in range(5):
-        assert contactfpga.open(board.path, timeout=LONG).port == board.path
+    ports = [contactfpga.open(board.path, timeout=LONG).port for _ in range(5)]
+    assert ports == [board.path] * 5
 
 
 def test_the_reader_ends_with_its_board(board):
