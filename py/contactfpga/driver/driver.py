@@ -169,9 +169,11 @@ def _given_back() -> bool:
     kept = list(_boards.items())
     for port, board in kept:
         _forget(port, board)
-    dropped = [link for one in DROPPED.copy() if (link := one()) is not None]
-    for link in dropped:
-        link.close()
+    with _lock:
+        dropped = [DROPPED.popleft() for _ in range(len(DROPPED))]
+    for one in dropped:
+        if (link := one()) is not None:  # else its reader has closed the port since it was found busy
+            link.close()
     return bool(kept or dropped)
 
 
