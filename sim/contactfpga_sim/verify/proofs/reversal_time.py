@@ -248,7 +248,7 @@ _CONTACT_BUGS = (
     Bug("of row 0 alone", ReversalScanner, "wakes", lambda _, inside: _wakes_alone(inside)),
 )  # fmt: skip
 _TOLD_BUGS = (
-    Bug("with the next frame", ReversalScanner, "news", lambda *_: 0),
+    Bug("with the next frame", ReversalScanner, "changed", lambda *_: 0),
     Bug("of column 0 alone", ReversalScanner, "stuck", lambda _, inside: inside.part("precharge").held[0]),
     Bug("a frame late", ReversalScanner, "begun", lambda _, inside: inside["rows__valid"]),
 )
