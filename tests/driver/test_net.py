@@ -55,7 +55,7 @@ class History(RuleBasedStateMachine):
 
     def open(self):
         self.world.closed = False
-        self.witness = Witness(self.world, self.world.life)
+        self.witness = Witness(self.world)
         since = self.world.now_us
         with contextlib.suppress(contactfpga.ReadTimeout):
             self.board = contactfpga.open(self.world, timeout=3.0)

@@ -193,7 +193,8 @@ class World:
     def _send_frame(self, begun, heard):
         index = self.board.sent
         number = len(self.truth)
-        zone = (1, number % self.skin.columns, number // self.skin.columns % self.skin.rows)
+        # The area tells lives apart: two of them may well have a frame of the same number, time and place.
+        zone = (1 + self.life % 100, number % self.skin.columns, number // self.skin.columns % self.skin.rows)
         self.board.moments = [zone]
         since = begun - self._on_us
         self.truth.append(Truth(begun, since, self.life, index, zone, self.skin.pitch_x_mm))
@@ -216,7 +217,7 @@ class World:
 class Witness:
     """Holds the frames that a host passes on against what the board sent."""
 
-    def __init__(self, world, life=0):
+    def __init__(self, world):
         self.world = world
         self.place = -1
 
