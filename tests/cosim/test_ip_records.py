@@ -36,7 +36,8 @@ FRAMES = 24
 
 @dataclasses.dataclass
 class Packed:
-    """What the golden model's packer takes in a clock: an item, or with it None the end mark of a frame."""
+    """What the golden model's packer takes in a clock: an item, or with it None the end mark of a frame. Without a
+    closing word neither: a restart, which drops the frame that is being filled."""
 
     item: int | None
     closing: dict[str, int] | None = None
@@ -104,12 +105,13 @@ def offered(skin, noted, takes):
         if begins:
             reading, waiting = waiting, None
         if event := noted.get(clock):
-            owed |= waiting is not None
-            waiting = None
+            if event.item is not None or event.closing:
+                owed |= waiting is not None
+                waiting = None
             if event.item is not None:
                 filling.append((event.item, False))
                 continue
-            if event.sent or owed:
+            if event.closing and (event.sent or owed):
                 closing = word(ip.closing_fields(skin), event.closing | {"number": number})
                 waiting, number, owed = [*filling, (closing, True)], number + 1, False
             filling = []
@@ -263,7 +265,7 @@ def test_both_streams_tell_of_the_same_zones_and_a_request_is_answered():
 @pytest.mark.parametrize("seed", range(2))
 def test_records_that_come_at_any_time_go_out_as_frames(seed):
     """The buffer by itself, far busier than the packer keeps it: frames of up to six records, of which a half is
-    sent."""
+    sent. Restarts cut some of them."""
     skin, clocks = SKINS["on change"], 4000
     rng, takes = random.Random(seed), stalling(seed)
     dut, noted, taken, got = Records(skin), {}, [], []
@@ -272,11 +274,15 @@ def test_records_that_come_at_any_time_go_out_as_frames(seed):
         left = 0
         for clock in range(clocks):
             comes, sent, item = rng.random() < 0.3, rng.random() < 0.5, rng.randrange(1 << 16)
+            restarts = not comes and rng.random() < 0.02
+            if restarts:
+                noted[clock], left = Packed(None), 0
             if comes:
                 told = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
                 noted[clock] = Packed(item) if left else Packed(None, told, sent)
                 ctx.set(dut.tag.time, told["time"])
                 ctx.set(dut.summary, {"zones": told["zones"], "cells": told["cells"]})
+            ctx.set(dut.restart, restarts)
             ctx.set(dut.taken, comes)
             ctx.set(dut.send, sent)
             ctx.set(dut.item, {"data": item, "end": not left})
