@@ -176,7 +176,8 @@ class ReversalScanner(wiring.Component):
         ]
         with m.If(cycle.strobe):
             m.d.sync += self.sampled.eq(clock.time)
-        at_begin, counted = Signal(), Signal(2)  # the last bit: the columns are counted in the next clock
+        at_begin = Signal()
+        counted = Signal(2)  # the last bit: the columns are counted in the next clock
         if "faults" in self.signature.members:
             m.d.sync += counted.eq(Cat(cycle.begins, counted))
             with m.If(counted[1]):
