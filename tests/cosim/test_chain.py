@@ -64,7 +64,8 @@ def check(seed):
             cells = np.array([[rng.random() < density for _ in range(skin.columns)] for _ in range(skin.rows)])
             zones = board.read(timeout=60.0)  # scanned after the cells were changed
             wanted, (off_x, off_y) = expected(skin, cells)
-            assert (zones.pressed, zones.flags - {"overflow"}) == (cells.sum(), set())
+            # Cells jump, and the host flags a zone that moved by more than a pitch since the scan before.
+            assert (zones.pressed, zones.flags - {"overflow", "motion"}) == (cells.sum(), set())
             if skin.report != "cells":
                 assert zones.total_zones == len(wanted)
             if "overflow" in zones.flags:
