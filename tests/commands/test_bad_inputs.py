@@ -74,7 +74,7 @@ def files(tmp_path_factory):
 
 
 @pytest.fixture
-def run(capsys, files, tmp_path, monkeypatch):
+def run(run, files, tmp_path, monkeypatch):
     """Runs a command in an empty folder; files by name. Returns status and errors; a traceback is the test's."""
     monkeypatch.chdir(tmp_path)
 
@@ -84,17 +84,11 @@ def run(capsys, files, tmp_path, monkeypatch):
             argument = argument.replace(name, str(files[name]))
         return argument
 
-    def run(*arguments):
-        try:
-            status = cli.main([named(argument) for argument in arguments])
-        except SystemExit as ended:
-            status = ended.code
-        said = capsys.readouterr()
-        return status, said.out + said.err if arguments[:1] == (
-            "doctor",
-        ) else said.err  # whose findings are its output
+    def run_named(*arguments):
+        status, out, errors = run(*map(named, arguments))
+        return status, out + errors if arguments[:1] == ("doctor",) else errors  # whose findings are its output
 
-    return run
+    return run_named
 
 
 def refused(status, errors):

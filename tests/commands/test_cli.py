@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -42,11 +41,10 @@ PARSERS = dict(parsers(cli._parser()))
 
 
 @pytest.mark.parametrize("name", PARSERS)
-def test_every_command_explains_itself(name, capsys):
-    with pytest.raises(SystemExit) as caught:
-        cli.main([*name.split()[1:], "--help"])
-    assert caught.value.code == 0
-    said = " ".join(capsys.readouterr().out.split())
+def test_every_command_explains_itself(name, run):
+    status, out, _ = run(*name.split()[1:], "--help")
+    said = " ".join(out.split())
+    assert status == 0
     assert f"usage: {name} " in said
     assert PARSERS[name].description in said
     below = cli.COMMANDS if name == "contactfpga" else {}
@@ -61,10 +59,10 @@ def test_every_command_explains_itself(name, capsys):
         ("xyz", "argument COMMAND: 'xyz' is none; known are zones, view, body, wire"),
     ],
 )
-def test_a_word_that_is_no_command(typed, said, capsys):
-    with pytest.raises(SystemExit):
-        cli.main(typed.split())
-    assert said in " ".join(capsys.readouterr().err.split())
+def test_a_word_that_is_no_command(typed, said, run):
+    status, _, errors = run(*typed.split())
+    assert status == 2
+    assert said in " ".join(errors.split())
 
 
 def test_pages_are_files_in_a_source_tree_and_addresses_elsewhere(tmp_path, monkeypatch):
@@ -146,41 +144,12 @@ def test_every_command_has_a_file_of_its_own():
     assert files == set(cli.COMMANDS)
 
 
-TOY = """
-EXTRA = None
-
-
-def add_flags(parser):
-    parser.add_argument("--times", type=int, default=1, help="How often.")
-
-
-def run(args):
-    print("hello " * args.times)
-    return 0
-"""
-
-
-def test_a_command_is_a_module_and_a_line_of_the_table(tmp_path, monkeypatch, run, capsys):
-    (tmp_path / "toy.py").write_text(TOY)
-    monkeypatch.setattr(commands, "__path__", [*commands.__path__, str(tmp_path)])
-    monkeypatch.delitem(sys.modules, "contactfpga.tools.commands.toy", raising=False)
-    monkeypatch.setitem(cli.COMMANDS, "toy", "Say hello.")
-    assert run("toy", "--times", 2) == (0, "hello hello \n", "")
-    with pytest.raises(SystemExit):
-        run("toy", "--help")
-    said = capsys.readouterr().out
-    assert "Say hello." in said
-    assert "--trust" in said
-
-
 @pytest.mark.parametrize(("old", "new"), cli.RENAMED.items())
-def test_an_old_name_works_and_names_the_new_one(old, new, capsys):
-    with pytest.raises(SystemExit) as caught:
-        cli.main([old, "--help"])
-    said = capsys.readouterr()
-    assert caught.value.code == 0
-    assert f"usage: contactfpga {new.removesuffix(' --recover')} " in said.out
-    assert said.err == f"contactfpga: contactfpga {old} is now contactfpga {new}\n"
+def test_an_old_name_works_and_names_the_new_one(old, new, run):
+    status, out, errors = run(old, "--help")
+    assert status == 0
+    assert f"usage: contactfpga {new.removesuffix(' --recover')} " in out
+    assert errors == f"contactfpga: contactfpga {old} is now contactfpga {new}\n"
 
 
 def test_topics_of_study_are_studies():

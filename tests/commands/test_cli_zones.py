@@ -79,24 +79,12 @@ def test_zones_with_tracks_follows_frames_that_are_not_shown(board, tmp_path, ru
     assert len(re.findall(r"│ +2 │ +4 │ 400 │", out)) == 1
 
 
-def test_zones_without_tracks_has_no_ids(board, run):
-    status, out, _ = run("zones", "--once", "--json", "--timeout", 60, board.path)
-    assert status == 0
-    assert not json.loads(out).keys() & {"tracks", "events"}
-
-
 def test_zones_records(board, tmp_path, run):
     file = tmp_path / "frames.bin"
     run("zones", "--once", "--json", "--record", file, "--timeout", 60, board.path)
     status, out, _ = run("zones", "--json", f"replay://{file}")
     assert status == 0
     assert {json.loads(line)["pressed"] for line in out.splitlines()} == {4}
-
-
-def test_zones_of_the_simulated_board(run):
-    status, out, _ = run("zones", "--once", "--json", "sim://?scene=two_fingers")
-    assert status == 0
-    assert len(json.loads(out)["zones"]) == 2
 
 
 @pytest.mark.parametrize(("form", "shows"), [("--json", '"pressed": 4'), ("--baud=3000000", "cells pressed")])

@@ -12,7 +12,6 @@ from reversal import FAST, small
 from contactfpga import examples
 from contactfpga.boards import BOARDS
 from contactfpga.skin import Skin
-from contactfpga.tools import cli
 from contactfpga_sim.lab import latency
 from contactfpga_sim.lab.finger import host, stages
 from contactfpga_sim.lab.finger.host import HostShare
@@ -90,11 +89,10 @@ SIZES = ("0x3", "3x0", "3", "axb", "100x1", "3x3x3", "", "٣x٣")
         *(("--timer", value, "is not a whole number from 1 to 255 ms") for value in ("0", "256", "1.5", "x")),
     ],
 )
-def test_what_no_option_takes_is_refused(capsys, option, value, says):
-    with pytest.raises(SystemExit) as caught:
-        cli.main(["latency", option, value])
-    assert caught.value.code == 2
-    assert says in " ".join(capsys.readouterr().err.split())
+def test_what_no_option_takes_is_refused(run, option, value, says):
+    status, _, errors = run(option, value)
+    assert status == 2
+    assert says in " ".join(errors.split())
 
 
 def test_a_contact_has_no_masked_switches():
@@ -184,10 +182,7 @@ def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
     rows = {line[:22].strip(): line[22:] for line in out.splitlines()}
     assert rows["bridge"] == "FT2232H of iCEBreaker, asked every 125 us, latency timer 1 ms, event character 0"
     assert rows["host to user code"].startswith("200.0 us median, 300.0 us 99 %, 300.0 us worst, measured by 2 touches")
-    assert rows["host to user code"].endswith("1 left out as the machine was busy")
     assert rows["measured on"] == "a machine, 2 cores"
-    assert rows["touch to decision"].endswith("with 100 us for the host as in `contactfpga study arm`")
-    assert rows["the paper"] == "6,000 us for the same, its sheet and control together"
     worst = [
         float(rows[title].replace(" us worst", "").split(", ")[2].split()[0])
         for title in ("touch to host", "touch to user code")

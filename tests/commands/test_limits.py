@@ -1,6 +1,5 @@
 """What a file from a stranger may cost: memory and processor time are bounded, and a limit is told in one line."""
 
-import contextlib
 import io
 import time
 import tomllib
@@ -24,7 +23,6 @@ from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin.several import MOST_SHEETS, Several
 from contactfpga.surfaces import Mesh, SurfaceError, mesh, mesh_file
 from contactfpga.surfaces.laying import Triangles
-from contactfpga.tools import cli
 from contactfpga.tools.commands.haptics import reading
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.model.scenes.file import SceneFile
@@ -139,24 +137,20 @@ def test_messages_are_short(tmp_path, read, text):
 
 
 @pytest.mark.parametrize("words", [["body", "show", "x.toml"], ["zones", f"--no-such-{LONG}"]], ids=["file", "option"])
-def test_no_error_fills_the_screen(tmp_path, monkeypatch, capsys, words):
+def test_no_error_fills_the_screen(tmp_path, monkeypatch, run, words):
     """What the system says of a name is as long as that."""
     monkeypatch.chdir(tmp_path)
     Path("x.toml").write_text(f'[[links]]\nname = "a"\nskin = "{LONG}"')
-    with contextlib.suppress(SystemExit):
-        assert cli.main(words) == 1
-    assert 0 < len(capsys.readouterr().err) < 10_000
+    assert 0 < len(run(*words)[2]) < 10_000
 
 
 @pytest.mark.parametrize(
     "arguments", [["replay", "x.npy", "--skin", "esc\x1b[2J"], ["zones", "\x1b[2J", "\u202eab"], ["\x1b]0;a\x07"]]
 )
-def test_what_the_parser_of_options_quotes_is_shown_as_escapes(capsys, arguments):
-    with contextlib.suppress(SystemExit):
-        cli.main([*arguments, "--no-such\x1b[2J"])
-    said = capsys.readouterr()
-    assert "\\x1b" in said.err
-    assert not any(one in said.out + said.err for one in "\x1b\x07\u202e")
+def test_what_the_parser_of_options_quotes_is_shown_as_escapes(run, arguments):
+    _, out, errors = run(*arguments, "--no-such\x1b[2J")
+    assert "\\x1b" in errors
+    assert not any(one in out + errors for one in "\x1b\x07\u202e")
 
 
 # ---- XML

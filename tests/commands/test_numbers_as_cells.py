@@ -105,14 +105,6 @@ def test_damaged_files_are_refused(tmp_path, start):
     assert str(caught.value).isprintable()
 
 
-def test_names_of_members_cannot_command_the_terminal(tmp_path):
-    path = tmp_path / "touch.npz"
-    np.savez(path, **{"\x1b]0;owned\x07": np.zeros(1)})
-    with pytest.raises(ArrayFileError) as caught:
-        read(path, ("pressed",))
-    assert r"holds \x1b]0;owned\x07; a recording" in str(caught.value)
-
-
 def test_bools_of_odd_bytes_are_true(tmp_path):
     path = tmp_path / "touch.npy"
     path.write_bytes(header("{'descr': '|b1', 'fortran_order': True, 'shape': (1, 2, 2)}") + bytes([0, 2, 255, 1]))

@@ -88,18 +88,6 @@ class Sheet:
         self.fingers = [(finger.x_mm, finger.y_mm, finger.radius_mm) for finger in fingers]
 
 
-def test_clicks_put_fingers_down_and_lift_them():
-    sheet = Sheet()
-    hand = Hand(sheet, 9.0)
-    hand.click(10, 10)
-    hand.click(50, 60)
-    assert sheet.fingers == [(10, 10, 9.0), (50, 60, 9.0)]
-    hand.click(15, 13)  # 5.8 mm from the first one
-    assert sheet.fingers == [(50, 60, 9.0)]
-    hand.lift()
-    assert sheet.fingers == []
-
-
 def test_a_click_over_the_seam_lifts_the_finger_on_the_other_side():
     sheet = Sheet()
     skin = Skin(rows=4, columns=12, surface="cylinder", radius_mm=60 / np.pi, closed=True)
