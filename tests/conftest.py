@@ -50,11 +50,14 @@ def board():
 
 @pytest.fixture
 def run(capsys):
-    """Runs a command in this process; returns status, output and errors."""
+    """Runs a command in this process, also one that its parser ends; returns status, output and errors."""
     from contactfpga.tools import cli
 
     def run(*arguments):
-        status = cli.main([str(argument) for argument in arguments])
+        try:
+            status = cli.main([str(argument) for argument in arguments])
+        except SystemExit as ended:
+            status = ended.code
         return status, *capsys.readouterr()
 
     return run

@@ -9,10 +9,8 @@ from sample import sample
 from try_page import assemble, kit, needs_node, node
 
 from contactfpga.design import kits
-from contactfpga.design.cover import load_cover
 from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.model.board.receiver import frames_in
-from contactfpga_sim.model.scenes.scene import NAMES, scene
 
 pytest.importorskip("amaranth")
 pytestmark = needs_node
@@ -44,19 +42,6 @@ def random_frames(count: int, seed: int) -> np.ndarray:
     """From nearly empty ones to nearly full ones."""
     rng = np.random.default_rng(seed)
     return rng.random((count, KIT.skin.rows, KIT.skin.columns)) < rng.choice([0.01, 0.05, 0.2, 0.5, 0.9], (count, 1, 1))
-
-
-@pytest.mark.slow
-def test_all_scenes_give_the_native_boards_bytes():
-    cover = load_cover(KIT.skin_path)
-    scenes = [scene(KIT.skin, name, cover) for name in NAMES]
-    frames = np.array([cells(seconds) for cells in scenes for seconds in (0.0, 0.31, 0.77)])
-    with native() as board:
-        board.hold(frames, 6 * ODD)
-        expected, cycle = board.receive(), board.cycle
-    found, cycles, read = by_page([held(frames, 6 * ODD)])
-    assert (found, cycles[-1]) == (expected, cycle)
-    assert len({frame["cells"] for frame in read["frames"]}) > 8
 
 
 @pytest.mark.slow

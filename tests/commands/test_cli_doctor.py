@@ -118,12 +118,6 @@ def test_doctor_takes_ghosts_for_no_fault(run):
     assert "the last frame has zones that may be ghosts" in out
 
 
-def test_doctor_of_a_port_that_is_not_there(run):
-    status, out, _ = run("doctor", "/dev/no_such_port")
-    assert status == 1
-    assert "fault /dev/no_such_port does not exist" in out
-
-
 def test_doctor_of_a_silent_board(board, run):
     board.answers = False
     status, out, _ = run("doctor", "--timeout", 0.2, board.path)

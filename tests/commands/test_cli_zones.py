@@ -1,14 +1,12 @@
 """`contactfpga zones` and `contactfpga wire`: what they print and keep."""
 
-import itertools
 import json
 import re
-import signal
 import subprocess
 import sys
 
 import pytest
-from fake_board import FakeBoard, wait_until
+from fake_board import FakeBoard
 
 import contactfpga
 
@@ -81,12 +79,6 @@ def test_zones_with_tracks_follows_frames_that_are_not_shown(board, tmp_path, ru
     assert len(re.findall(r"│ +2 │ +4 │ 400 │", out)) == 1
 
 
-def test_zones_without_tracks_has_no_ids(board, run):
-    status, out, _ = run("zones", "--once", "--json", "--timeout", 60, board.path)
-    assert status == 0
-    assert not json.loads(out).keys() & {"tracks", "events"}
-
-
 def test_zones_records(board, tmp_path, run):
     file = tmp_path / "frames.bin"
     run("zones", "--once", "--json", "--record", file, "--timeout", 60, board.path)
@@ -95,30 +87,13 @@ def test_zones_records(board, tmp_path, run):
     assert {json.loads(line)["pressed"] for line in out.splitlines()} == {4}
 
 
-def test_zones_of_the_simulated_board(run):
-    status, out, _ = run("zones", "--once", "--json", "sim://?scene=two_fingers")
-    assert status == 0
-    assert len(json.loads(out)["zones"]) == 2
-
-
-def test_reader_of_json_may_end_first(board):
-    board.stream = lambda: b"".join(board.frame() for _ in range(50))
-    command = [sys.executable, "-m", "contactfpga.tools.cli", "zones", "--json", "--timeout", "60", board.path]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert json.loads(process.stdout.readline())["pressed"] == 4
-        process.stdout.close()
-        assert process.wait(60) == 0
-        assert process.stderr.read() == ""
-
-
-@pytest.mark.slow
-def test_reader_of_tables_has_the_first_at_once_and_may_end_first(board):
+@pytest.mark.parametrize(("form", "shows"), [("--json", '"pressed": 4'), ("--baud=3000000", "cells pressed")])
+def test_a_reader_has_the_first_frame_at_once_and_may_end_first(board, form, shows):
     """`contactfpga zones | head -1`: nothing may wait for the end of what has none."""
     board.stream = board.frame
-    command = [sys.executable, "-m", "contactfpga", "zones", "--timeout", "60", board.path]
+    command = [sys.executable, "-m", "contactfpga", "zones", form, "--timeout", "60", board.path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        lines = iter(process.stdout.readline, "")
-        assert sum("cells pressed" in line for line in itertools.islice(lines, 100)) >= 2
+        assert any(shows in line for line in iter(process.stdout.readline, ""))
         assert process.poll() is None
         process.stdout.close()
         assert process.wait(60) == 0
@@ -142,19 +117,6 @@ def test_zones_end_after_the_seconds_asked_for(board, tmp_path, run, form):
 
 def replayed(folder):
     return "zones", f"replay://{folder / 'touches.rec'}"
-
-
-def test_interrupt_ends_the_live_view_quietly(board):
-    command = [sys.executable, "-m", "contactfpga.tools.cli", "zones", "--timeout", "60", board.path]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        wait_until(lambda: board.asked)
-        board.stream = board.frame
-        seen = any("cells pressed" in line for line in iter(process.stdout.readline, ""))
-        assert seen, process.stderr.read()
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert errors == ""
 
 
 # ---- wire

@@ -59,14 +59,6 @@ def test_a_circle_has_the_zones_area(scale):
     assert across == pytest.approx(2 * down, rel=0.15)  # as columns are half as far apart
 
 
-def test_a_circle_that_leaves_the_sheet_is_cut_off_there():
-    for scale in SCALES:
-        for corner in ((0, 0), (15, 15), (0, 15)):
-            drawing = draw(zones(Skin(), (50, *corner)), scale)
-            assert (drawing.kinds == CENTER).sum() == 1
-            assert drawing.characters.shape == (4 * scale, 8 * scale)
-
-
 @pytest.mark.parametrize("scale", SCALES)
 def test_a_circle_over_the_seam_goes_on_at_the_other_end(scale):
     around = Skin(rows=10, columns=12, surface="cylinder", radius_mm=40.0, closed=True)

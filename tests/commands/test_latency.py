@@ -12,7 +12,6 @@ from reversal import FAST, small
 from contactfpga import examples
 from contactfpga.boards import BOARDS
 from contactfpga.skin import Skin
-from contactfpga.tools import cli
 from contactfpga_sim.lab import latency
 from contactfpga_sim.lab.finger import host, stages
 from contactfpga_sim.lab.finger.host import HostShare
@@ -52,21 +51,14 @@ def test_the_fast_example_reaches_its_figures(run):
 
 
 @pytest.mark.slow
-def test_the_figures_are_told_in_words(run):
-    status, out, _ = run("--skin", FILE, "--cells", "2x5", "--touches", "2", "--exact")
+@pytest.mark.parametrize("cells", ["1x1", "2x5", "16x16"])
+def test_the_figures_are_told_in_words(run, cells):
+    status, out, _ = run("--skin", FILE, "--cells", cells, "--touches", "2", "--exact")
     assert status == 0
     assert "16x16, scan 'reversal', 24 MHz, 12 Mbaud" in out
-    assert "2x5 cells at 2 places" in out
+    assert f"{cells} cells at " in out
     for title in ("touch to last byte", "touch to contact pin", "frames per second", "bytes"):
         assert title in out
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cells", ["1x1", "16x16"])
-def test_the_smallest_and_the_largest_contact(run, cells):
-    status, out, _ = run("--skin", FILE, "--cells", cells, "--touches", "1", "--exact", "--json")
-    assert status == 0
-    assert json.loads(out)["touches"] == 1
 
 
 @pytest.mark.parametrize(
@@ -85,15 +77,22 @@ def test_errors_are_one_line(run, words, message):
     assert (status, out) == (1, "")
     assert message in err
     assert err.count("\n") == 1
-    assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("cells", ["0x3", "3x0", "3", "axb", "100x1", "3x3x3", "", "٣x٣"])
-def test_what_is_no_size_is_refused(capsys, cells):
-    with pytest.raises(SystemExit) as caught:
-        cli.main(["latency", "--cells", cells])
-    assert caught.value.code == 2
-    assert "write rows x columns of the contact, such as 3x3" in " ".join(capsys.readouterr().err.split())
+SIZES = ("0x3", "3x0", "3", "axb", "100x1", "3x3x3", "", "٣x٣")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        *(("--cells", size, "write rows x columns of the contact, such as 3x3") for size in SIZES),
+        *(("--timer", value, "is not a whole number from 1 to 255 ms") for value in ("0", "256", "1.5", "x")),
+    ],
+)
+def test_what_no_option_takes_is_refused(run, option, value, says):
+    status, _, errors = run(option, value)
+    assert status == 2
+    assert says in " ".join(errors.split())
 
 
 def test_a_contact_has_no_masked_switches():
@@ -183,10 +182,7 @@ def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
     rows = {line[:22].strip(): line[22:] for line in out.splitlines()}
     assert rows["bridge"] == "FT2232H of iCEBreaker, asked every 125 us, latency timer 1 ms, event character 0"
     assert rows["host to user code"].startswith("200.0 us median, 300.0 us 99 %, 300.0 us worst, measured by 2 touches")
-    assert rows["host to user code"].endswith("1 left out as the machine was busy")
     assert rows["measured on"] == "a machine, 2 cores"
-    assert rows["touch to decision"].endswith("with 100 us for the host as in `contactfpga study arm`")
-    assert rows["the paper"] == "6,000 us for the same, its sheet and control together"
     worst = [
         float(rows[title].replace(" us worst", "").split(", ")[2].split()[0])
         for title in ("touch to host", "touch to user code")
@@ -211,11 +207,3 @@ def test_settings_of_the_bridge_are_told(run):
     assert found["touch_to_user_code_us"] is None
     late, board = found["touch_to_host_us"], found["touch_to_last_byte_us"]
     assert board["worst"] < late["median"] < late["worst"] < board["worst"] + 2000 + 20
-
-
-@pytest.mark.parametrize("value", ["0", "256", "1.5", "x"])
-def test_a_timer_that_no_chip_has_is_refused(capsys, value):
-    with pytest.raises(SystemExit) as caught:
-        cli.main(["latency", "--timer", value])
-    assert caught.value.code == 2
-    assert "is not a whole number from 1 to 255 ms" in " ".join(capsys.readouterr().err.split())

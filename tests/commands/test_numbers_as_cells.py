@@ -3,7 +3,6 @@
 import re
 import struct
 import warnings
-import zipfile
 
 import numpy as np
 import pytest
@@ -85,8 +84,6 @@ def header(text):
 @pytest.mark.parametrize(
     "start",
     [
-        header("{'descr': '|b1', 'fortran_order': False, 'shape': (1000000000, 1000, 1000)}"),
-        header("{'descr': '|b1', 'fortran_order': False, 'shape': (-1, 2, 2)}"),
         header("{'descr': '|O', 'fortran_order': False, 'shape': (1, 2, 2)}"),
         header("{'descr': '|V0', 'fortran_order': False, 'shape': (1000000000000000, 2, 2)}"),
         header("{'descr': '\x1b[31m', 'fortran_order': False, 'shape': (1, 2, 2)}"),
@@ -106,24 +103,6 @@ def test_damaged_files_are_refused(tmp_path, start):
     with pytest.raises(ArrayFileError, match=re.escape(str(path))) as caught:
         read(path, ("pressed",))
     assert str(caught.value).isprintable()
-
-
-def test_a_member_that_claims_too_much_is_refused(tmp_path):
-    path = tmp_path / "touch.npz"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr(
-            "pressed.npy", header("{'descr': '|b1', 'fortran_order': False, 'shape': (1000000000, 1000, 1000)}")
-        )
-    with pytest.raises(ArrayFileError, match="claims shape"):
-        read(path, ("pressed",))
-
-
-def test_names_of_members_cannot_command_the_terminal(tmp_path):
-    path = tmp_path / "touch.npz"
-    np.savez(path, **{"\x1b]0;owned\x07": np.zeros(1)})
-    with pytest.raises(ArrayFileError) as caught:
-        read(path, ("pressed",))
-    assert r"holds \x1b]0;owned\x07; a recording" in str(caught.value)
 
 
 def test_bools_of_odd_bytes_are_true(tmp_path):

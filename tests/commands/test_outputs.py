@@ -1,12 +1,12 @@
 """Where results are written is looked at before the work; what was worked out is not lost."""
 
 import os
+import re
 
 import numpy as np
 import pytest
 from every_command import called, leaves, options
 
-from contactfpga.tools import cli
 from contactfpga.tools.console import outputs
 from contactfpga_sim.lab import pool
 from contactfpga_sim.lab.arm import pictures, sweep
@@ -44,21 +44,18 @@ def test_each_command_with_an_output_takes_the_short_option():
 
 @pytest.mark.parametrize("where", ["a file", "below a file", "a device"])
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_folder_that_cannot_be_is_refused_before_the_work(name, where, tmp_path, worked, capsys):
+def test_a_folder_that_cannot_be_is_refused_before_the_work(name, where, tmp_path, worked, run):
     place = places(tmp_path)[where]
-    assert cli.main([*COMMANDS[name], "--output", str(place)]) == 1
-    said = capsys.readouterr()
-    assert said.err.count("\n") == 1
-    assert "--output is" in said.err
-    assert str(place) in said.err
-    assert said.out == ""
+    status, out, errors = run(*COMMANDS[name], "--output", place)
+    assert (status, out, errors.count("\n")) == (1, "", 1)
+    assert "--output is" in errors
+    assert str(place) in errors
     assert worked == []
 
 
-def test_a_file_that_cannot_be_is_refused_before_the_work(tmp_path, worked, capsys):
+def test_a_file_that_cannot_be_is_refused_before_the_work(tmp_path, worked, run):
     for place in (tmp_path, "/dev/null/skin.toml"):
-        assert cli.main(["fit", "examples/scenes-bumper.toml", "--output", str(place)]) == 1
-        assert "--output is" in capsys.readouterr().err
+        assert "--output is" in run("fit", "examples/scenes-bumper.toml", "--output", place)[2]
     assert worked == []
 
 
@@ -72,35 +69,22 @@ def test_a_place_that_can_be_is_made_and_nothing_is_left_in_it(tmp_path):
     assert (tmp_path / "kept").read_text() == "as it was"
 
 
-def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
+def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, run):
     def refused(*_):
         raise OSError(28, "No space left on device")
 
     point = sweep.SweepPoint(1.0, 1.0, 1.0, 1.0, 1.0)
     monkeypatch.setattr(pictures, "draw", refused)
     monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
-    assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1
-    said = capsys.readouterr()
-    assert "No space left" in said.err
-    assert str(tmp_path / "arm-charts.csv") in said.out
+    status, out, errors = run("study", "arm", "--charts", "--jobs", "1", "--output", tmp_path)
+    assert status == 1
+    assert "No space left" in errors
+    assert str(tmp_path / "arm-charts.csv") in out
     assert len((tmp_path / "arm-charts.csv").read_text().splitlines()) > 100
 
 
-def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsys):
-    from contactfpga_sim.lab.arm import report
-
-    def refused(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(pictures, "pictures", refused)
-    monkeypatch.setattr(report, "columns", lambda *_: {})
-    monkeypatch.setattr(report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
-    assert cli.main(["study", "arm", "--places", "0", "--output", str(tmp_path)]) == 1
-    assert "18.91" in capsys.readouterr().out
-
-
 @pytest.mark.slow
-def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, capsys):
+def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, run):
     from contactfpga.tools.commands import replay
     from contactfpga_sim.model.board import native
 
@@ -116,9 +100,8 @@ def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypat
     monkeypatch.setattr(native, "load", build)
     monkeypatch.setattr(replay.time, "monotonic", lambda: now.__setitem__(0, now[0] + 1.0) or now[0])
     np.save(tmp_path / "frames.npy", np.tile(np.eye(16, dtype=bool), (500, 1, 1)))
-    assert cli.main(["replay", str(tmp_path / "frames.npy")]) == 0
-    speed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("speed"))
-    assert "500 frames per second" in speed
+    said = run("replay", tmp_path / "frames.npy")[1]
+    assert re.search("^speed .*500 frames per second", said, re.MULTILINE)
 
 
 def test_a_file_is_named_as_it_was_asked_for(tmp_path):

@@ -158,13 +158,6 @@ def test_a_pipe_has_no_width_unless_one_is_asked_for(monkeypatch):
         assert terminal.of(Stream("utf-8")).width == terminal.PIPE_WIDTH
 
 
-@pytest.mark.parametrize(
-    ("encoding", "unicode"), [("utf-8", True), ("UTF-8", True), ("ascii", False), ("latin-1", False)]
-)
-def test_the_encoding_decides_on_characters(encoding, unicode):
-    assert terminal.of(Stream(encoding)).unicode is unicode
-
-
 def test_what_an_encoding_lacks_is_written_as_what_is_nearest():
     code = "from contactfpga import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
     result = subprocess.run(

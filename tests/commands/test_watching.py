@@ -39,14 +39,26 @@ def touched(seconds, frames_each=8):
     return cells
 
 
-def test_a_watch_says_what_is_stuck_and_what_is_dead(run, simulated):
+@pytest.fixture
+def watched(run, simulated):
+    """Status and output of a watch of these cells for 0.2 s: ``watched(cells, *options)``."""
+
+    def watched(cells, *options):
+        arguments = ("--seconds", 0.2, "--stuck-s", 0.1, *options, *simulated(cells))
+        status, out, errors = run("doctor", "--watch", *arguments)
+        assert errors == "" or "building the 4x4 board" in errors
+        return status, out
+
+    return watched
+
+
+def test_a_watch_says_what_is_stuck_and_what_is_dead(watched):
     cells = touched(0.25)
     cells[:, 3, 1] = True
     cells[:, 0, 2] = False
     cells[:, 2, 0] = False
-    status, out, errors = run("doctor", "--watch", "--seconds", 0.2, "--stuck-s", 0.1, *simulated(cells))
+    status, out = watched(cells)
     assert status == 1
-    assert errors == "" or "building the 4x4 board" in errors
     found = [line for line in out.splitlines() if line.startswith("fault")]
     assert len(found) == 2
     assert found[0].startswith("fault cell (3, 1) pressed for 0.1 s, since the first frame, while ")
@@ -54,17 +66,11 @@ def test_a_watch_says_what_is_stuck_and_what_is_dead(run, simulated):
     assert tomllib.loads(out.splitlines()[-1]) == {"mask": [[3, 1]]}
 
 
-def test_a_watch_of_a_sound_sheet_finds_nothing(run, simulated):
-    status, out, errors = run("doctor", "--watch", "--seconds", 0.2, "--stuck-s", 0.1, *simulated(touched(0.25)))
-    assert (status, errors) == (0, "")
-    assert out.splitlines()[1:] == ["ok    every switch read pressed at least once"]
-
-
-def test_a_watch_in_json(run, simulated):
+def test_a_watch_in_json(watched):
     cells = touched(0.25)
     cells[:, 3, 1] = True
     cells[:, :, 2] = False
-    status, out, _ = run("doctor", "--watch", "--json", "--seconds", 0.2, "--stuck-s", 0.1, *simulated(cells))
+    status, out = watched(cells, "--json")
     answer = json.loads(out)
     assert (status, answer["faults"]) == (1, 2)
     assert answer["seen"] == [[1, 1, 0, 1]] * 4
@@ -74,8 +80,9 @@ def test_a_watch_in_json(run, simulated):
     assert 0.2 <= answer["seconds"] < 0.21
 
 
-def test_a_sheet_that_nobody_touches_is_a_fault(run, simulated):
-    status, out, _ = run("doctor", "--watch", "--seconds", 0.05, *simulated(np.zeros((1, 4, 4), bool)))
+def test_a_sheet_that_nobody_touches_is_a_fault_and_a_sound_one_is_not(watched):
+    assert watched(touched(0.25))[1].splitlines()[1:] == ["ok    every switch read pressed at least once"]
+    status, out = watched(np.zeros((1, 4, 4), bool))
     assert status == 1
     assert "fault no switch read pressed; was the sheet touched?" in out
 
@@ -100,29 +107,24 @@ def test_ctrl_c_ends_a_watch_with_what_it_found(simulated):
         terminal.process.kill()
 
 
-def watched_until_silent(run, board):
-    """Status and output of a watch of a board that falls silent once it has said hello."""
-
-    def watched(timeout_s):
-        return run("doctor", "--watch", "--timeout", timeout_s, board.path)[:2]
-
-    return patiently(watched, lambda found: "Touch every switch" in found[1], (0.3, 3.0, 60.0))
-
-
-def test_of_zones_a_watch_says_what_it_cannot_tell(run):
-    with FakeBoard(Skin()) as board:
-        status, out = watched_until_silent(run, board)
+@pytest.mark.parametrize(
+    ("skin", "says"),
+    [
+        (Skin(), 'report = "cells"'),
+        (SKIN, "note  the mask of this board is not known, so absent switches look dead; give --skin FILE"),
+    ],
+)
+def test_a_watch_says_what_it_cannot_tell(run, skin, says):
+    """Of a board that falls silent once it has said hello."""
+    with FakeBoard(skin) as board:
+        status, out = patiently(
+            lambda timeout_s: run("doctor", "--watch", "--timeout", timeout_s, board.path)[:2],
+            lambda found: "Touch every switch" in found[1],
+            (0.3, 3.0, 60.0),
+        )
     assert status == 1
-    assert 'report = "cells"' in out
-    assert "contactfpga build BOARD --skin FILE" in out
+    assert says in out
     assert "fault " in out
-
-
-def test_a_mask_that_is_not_known_is_said(run):
-    with FakeBoard(SKIN) as board:
-        status, out = watched_until_silent(run, board)
-    assert status == 1
-    assert "note  the mask of this board is not known, so absent switches look dead; give --skin FILE" in out
 
 
 def test_a_time_without_a_watch_is_refused(run):
@@ -173,26 +175,24 @@ def test_without_a_press_nothing_is_measured(run, simulated):
     assert "No press and no release ended" in out
 
 
-def test_a_board_that_debounces_is_refused(run, tmp_path):
-    skin, file = SKIN.replace(debounce="sym_defer_pk"), tmp_path / "skin.toml"
-    file.write_text(skin.to_toml())
-    assert "debounces ('sym_defer_pk'), which hides the bounce" in refused(run, skin, "--skin", file)
+DEBOUNCED = SKIN.replace(debounce="sym_defer_pk")
 
 
-def test_a_board_whose_debounce_is_not_known_is_refused(run):
-    assert "give the Skin that it was built from: --skin FILE" in refused(run, SKIN)
-
-
-def test_zones_are_refused(run):
-    assert 'report = "cells"' in refused(run, Skin())
-
-
-def refused(run, skin, *more):
-    """What is said instead of a measurement at a board of this Skin."""
+@pytest.mark.parametrize(
+    ("skin", "options", "says"),
+    [
+        (DEBOUNCED, ["--skin", "skin.toml"], "debounces ('sym_defer_pk'), which hides the bounce"),
+        (SKIN, [], "give the Skin that it was built from: --skin FILE"),
+        (Skin(), [], 'report = "cells"'),
+    ],
+)
+def test_a_board_whose_bounce_does_not_show_is_refused(run, tmp_path, monkeypatch, skin, options, says):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "skin.toml").write_text(skin.to_toml())
     with FakeBoard(skin) as board:
-        status, _, errors = run("wire", "--bounce", "--timeout", 60, board.path, *more)
+        status, _, errors = run("wire", "--bounce", "--timeout", 60, board.path, *options)
     assert status == 1
-    return errors
+    assert says in errors
 
 
 @pytest.mark.parametrize("flags", [("--seconds", 1), ("--json",)])

@@ -102,17 +102,3 @@ def test_pages_say_what_a_late_stop_costs_over_the_kits_foam(page):
     late, never = (each.split(" / ")[0] for each in peaks_of(KITS[0])[1:])
     (said,) = re.findall(r"2 mm of foam.{0,60}?6 ms late.{0,120}?([\d.]+) N.{0,40}?no stop.{0,40}?([\d.]+) N", text)
     assert said == (late, never)
-
-
-def test_the_state_is_told_alike():
-    pages = [ROOT / "README.md", ROOT / "docs/index.md", ROOT / "docs/status.md"]
-    said = {" ".join(re.search(r"\*\*State: ([^.]*)\.", page.read_text())[1].split()) for page in pages}
-    assert len(said) == 1
-
-
-@pytest.mark.parametrize("index", range(MOST))
-def test_each_headline_links_to_the_page_that_measures_it(index):
-    (link,) = re.findall(r"\]\((docs/[^)]*)\)", headlines()[index][0])
-    page, _, anchor = link.partition("#")
-    titles = re.findall(r"^## (.*)$", (ROOT / page).read_text(), flags=re.MULTILINE)
-    assert anchor in {title.lower().replace("'", "").replace(" ", "-") for title in titles}

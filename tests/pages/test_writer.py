@@ -1,8 +1,5 @@
 """Tables in pages: only what is between their markers is written."""
 
-import subprocess
-import sys
-
 import pytest
 
 from contactfpga.tools.console.outputs import OutputError
@@ -52,49 +49,18 @@ def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
 LONG = '    a command\n\n| a | b |\n|---|---|\n| 1, 2 |  |\n| 3 | x y |\n| 4 | "z" |\n\n| c |\n|---|\n| 5 |\n\nafter'
 
 
-def test_a_long_table_is_in_a_file_beside_the_page(tmp_path):
+@pytest.mark.parametrize(
+    ("columns", "shown", "rows"),
+    [
+        (None, ["| a | b |", "|---|---|", "| 3 | x y |", '| 4 | "z" |'], "3 rows"),
+        ("b", ["| b |", "|---|", "| x y |", '| "z" |'], "3 rows, 2 columns"),
+    ],
+)
+def test_what_a_page_leaves_out_of_a_table_is_in_a_file_beside_it(tmp_path, columns, shown, rows):
     file = tmp_path / "tables" / "page-one.csv"
-    text = beside.part(LONG, "x|z", file)
-    assert text.splitlines()[2:8] == ["| a | b |", "|---|---|", "| 3 | x y |", '| 4 | "z" |', "", text.splitlines()[7]]
-    assert text.splitlines()[7] == "All [3 rows](tables/page-one.csv)."
+    text = beside.part(LONG, "x|z", file, *([columns] if columns else []))
+    assert text.splitlines()[2:8] == [*shown, "", f"All [{rows}](tables/page-one.csv)."]
     assert text.partition("csv).\n")[2] == LONG.partition('"z" |\n')[2]
     assert file.read_text() == 'a,b\n"1, 2",\n3,x y\n4,"""z"""\n'
     (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
     assert beside.whole(tmp_path / "page.md", "one") == LONG
-
-
-def test_a_wide_table_leaves_columns_to_its_file(tmp_path):
-    file = tmp_path / "tables" / "page-one.csv"
-    text = beside.part(LONG, "x|z", file, "b")
-    assert text.splitlines()[2:8] == ["| b |", "|---|", "| x y |", '| "z" |', "", text.splitlines()[7]]
-    assert text.splitlines()[7] == "All [3 rows, 2 columns](tables/page-one.csv)."
-    (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
-    assert beside.whole(tmp_path / "page.md", "one") == LONG
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("module", "arguments", "message"),
-    [
-        ("lab", ["units"], "contactfpga: there is no folder 'docs' here; run this in the folder of the sources"),
-        (
-            "verify.netlist.replay",
-            ["icebreaker", "--skin", "none.toml"],
-            "contactfpga: none.toml: No such file or directory",
-        ),
-        (
-            "verify.netlist.replay",
-            ["icebreaker", "--skin", "bad.toml"],
-            "contactfpga: bad.toml: rows is 0; it must lie",
-        ),
-        ("lab.mutants", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
-        ("lab.speed.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
-    ],
-)
-def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):
-    (tmp_path / "bad.toml").write_text("rows = 0")
-    command = [sys.executable, "-m", f"contactfpga_sim.{module}", *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=250)
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.returncode in (1, 2)

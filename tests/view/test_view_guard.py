@@ -116,7 +116,7 @@ def test_a_foreign_page_neither_reads_nor_presses(served):
         {"origin": ""},
         {"origin": "http://evil.example"},
         {"host": f"evil.example:{port}"},
-        {"token": False, "query": f"?token={guard.token[:-1]}x"},
+        {"token": False, "query": f"?token={guard.token}"},
     ):
         with pytest.raises(InvalidStatus, match="403") as caught:
             socket_of(port, guard, **refused)
@@ -133,12 +133,6 @@ def test_a_foreign_page_neither_reads_nor_presses(served):
     assert len(clicks) == before
 
 
-def test_the_token_in_the_address_opens_no_socket(served):
-    port, guard, _ = served
-    with pytest.raises(InvalidStatus, match="403"):
-        socket_of(port, guard, token=False, query=f"?token={guard.token}")
-
-
 def test_nobody_can_ask_for_a_tunnel():
     """viser would let its clients open one to a server of its authors."""
     server, _ = serving.serve(port=0)
@@ -148,18 +142,6 @@ def test_nobody_can_ask_for_a_tunnel():
         assert not {kind for kind in kinds if "ShareUrl" in kind}
     finally:
         serving.stop(server)
-
-
-def test_it_listens_on_this_computer_alone(served):
-    port, _, _ = served
-    for name in (socket.gethostname(), "127.0.0.2"):
-        try:
-            address = socket.gethostbyname(name)
-        except OSError:
-            continue
-        if address != "127.0.0.1":
-            with pytest.raises(OSError):
-                socket.create_connection((address, port), timeout=5).close()
 
 
 def test_a_port_that_is_taken_is_named(served):

@@ -5,6 +5,7 @@ import json
 import pytest
 from fake_board import wait_until
 from recorded_stream import StreamPort
+from sample import sample
 from two_links import FLAT, ROBOT, ROUND, write_robot
 
 pytest.importorskip("viser")
@@ -77,7 +78,7 @@ def test_a_picture_takes_a_name_with_dollar_signs(tmp_path):
 
 @pytest.mark.slow  # the browser draws with the processor
 @pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed")
-@pytest.mark.parametrize("which", ["robot", "link"])
+@pytest.mark.parametrize("which", sample(["robot", "link"], quick=["robot"]))
 def test_a_browser_runs_and_loads_nothing(tmp_path, which):
     pytest.importorskip("playwright")
     file, links = record(tmp_path, "h")

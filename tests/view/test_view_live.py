@@ -1,6 +1,5 @@
 """A click in the page becomes a zone in the page, through the real gateware, the driver and the view."""
 
-import math
 import struct
 
 import pytest
@@ -11,10 +10,9 @@ pytest.importorskip("amaranth")
 
 from fake_board import wait_until
 from viewed import Page, camera, click, drag
-from viser import _messages
 
 import contactfpga
-from contactfpga.tools.view import cameras, opening
+from contactfpga.tools.view import opening
 
 CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circles"
 
@@ -96,30 +94,6 @@ def test_the_panel_says_how_it_goes(page):
     facts = str(page.hear(lambda message: "**latency**" in str(message)))
     assert "**lost** nothing" in facts
     assert "frames per second" in facts
-
-
-def sized(page, width, height):
-    """Say that the window is so large, and where it is told to put its camera."""
-    page.say(camera((0.075, 0.075, 1.0), size=(width, height)))
-    return page.hear(lambda message: message["type"] == "SetCameraPositionMessage")["position"]
-
-
-def test_the_sheet_is_fitted_again_into_a_window_of_another_size(page):
-    """Straight from above, where the camera says that it looks from. By hand: 1.4 pitches beside the first cells and
-    0.4 beyond the last make 178 mm, and half of that is seen under half the field of view, or under that times the
-    aspect."""
-    high = 0.089 / math.tan(0.35) * cameras.ROOM
-    assert sized(page, 300, 200) == pytest.approx((0.075, 0.075, high), abs=1e-6)
-    assert sized(page, 100, 200) == pytest.approx((0.075, 0.075, 2 * high), abs=1e-6)
-
-
-def test_a_key_turns_the_view(page):
-    (key,) = [m for m in page.heard if m["type"] == "RegisterCommandMessage" and m["props"]["hotkey"] == "2"]
-    assert key["props"]["label"] == "View: front"
-    page.say(_messages.CommandTriggerMessage(key["uuid"]))
-    x, y, high = page.hear(lambda message: message["type"] == "SetCameraPositionMessage")["position"]
-    assert (x, y) == pytest.approx((0.075, 0.075), abs=1e-6)
-    assert high > 0.2
 
 
 @pytest.mark.slow  # the example is a large board to compile
