@@ -10,9 +10,7 @@ from sample import sample
 from study_pages import section
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance import labellers as label_figures
-from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
@@ -77,20 +75,3 @@ def test_no_line_of_the_tables_is_above_its_bound():
     for line in lines:
         values = list(map(int, line))
         assert values == sorted(values)
-
-
-def test_the_text_says_what_the_tables_say():
-    text = " ".join(PAGE.split())
-    (run,) = re.findall(r"\| `run` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks \| \d+ \|", TABLES)
-    (serial,) = re.findall(r"\| `serial` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks", TABLES)
-    assert f"its last record at most {run} clocks after the last row." in text
-    assert re.search(rf"\bneeds up to {serial} clocks\b", text)
-    recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", TABLES)
-    most, worst = (max(map(int, column)) for column in zip(*recorded))
-    assert f"On five sheets they take {most} clocks or fewer in 99 % and up to {worst}," in text
-
-
-@pytest.mark.skipif(not (ROOT / scans.RECORDINGS).is_dir(), reason="no recordings")
-def test_the_recordings_table_is_up_to_date():
-    recordings = scans.recordings(ROOT / scans.RECORDINGS)
-    assert writer.spelled(label_figures.recorded_table(recordings)) == section("performance.md", "labeller_recorded")
