@@ -1,4 +1,4 @@
-"""The momentum observer that is set beside the sheet: right where it is told the truth, and the page's table."""
+"""The momentum observer that is set beside the sheet: right where it is told the truth."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The arm's charts, and the page on it: what latency costs, point by point."""
+"""The arm's charts: what latency costs, point by point."""
 
 import csv
 import dataclasses
@@ -87,10 +87,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
     paths = pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))
     assert [path.name for path in paths] == ["arm-force.svg", "arm-thickness.svg"]
-    texts = [path.read_text() for path in paths]
-    assert all("<svg" in text for text in texts)
-    assert "paper: 12 N when it reacts, after 6 ms" in texts[0]
-    assert pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
+    assert "paper: 12 N when it reacts, after 6 ms" in paths[0].read_text()
     text = pictures.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
     lines = list(csv.DictReader(text.splitlines()))
     assert len(lines) == len(found)

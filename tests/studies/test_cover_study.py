@@ -1,4 +1,4 @@
-"""The pages on the cover: their tables are those that the code gives, and the rules that fail do."""
+"""The pages on the cover: errors in their tables, rules that hold and rules that fail."""
 
 import math
 import re

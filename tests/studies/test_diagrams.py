@@ -1,4 +1,4 @@
-"""The diagrams: they are the ones that are drawn, and show what commands and pages say elsewhere."""
+"""The diagrams show what commands and pages say elsewhere."""
 
 import contextlib
 import io

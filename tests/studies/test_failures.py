@@ -5,7 +5,6 @@ import dataclasses
 import functools
 import math
 import re
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -147,7 +146,7 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
 
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
-    assert not outdated("failures", computed=turned)
+    assert not outdated("failures", turned)
     for name in KNOBS.keys() - tables.SAID.keys():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(KNOBS[name], turned[name]) == drawn
@@ -409,41 +408,6 @@ def test_lines_of_the_table(verdicts, expected):
     knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
     (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
     assert line.split(" | ")[1:-1] == ["method", *expected]
-
-
-SPACE = "{http://www.w3.org/2000/svg}"
-
-
-def parts(picture):
-    """Kinds of the bars, what is written, and the heights of each chart's steps in pixels above none."""
-    root = ElementTree.fromstring(picture)
-    bars = [bar.get("class") for bar in root.iter(f"{SPACE}rect") if bar.get("class")]
-    words = [(float(text.get("x")), text.text) for text in root.iter(f"{SPACE}text")]
-    areas = [path.get("d") for path in root.iter(f"{SPACE}path") if path.get("class") == "shares"]
-    heights = []
-    for area in areas:
-        *steps, bottom = map(int, re.findall(r"(?:^M[\d.]+ |V)(\d+)", area))
-        heights.append([bottom - step for step in steps])
-    return bars, words, heights
-
-
-def shares(*amounts):
-    """Of draws that are right; what is below 95 % is not noticed."""
-    return Sweep(
-        tuple(range(len(amounts))), tuple(Outcome(amount >= 0.95, what="x", amount=amount) for amount in amounts)
-    )
-
-
-def test_a_picture_shows_every_value_and_says_what_bars_mean():
-    knob = Knob("x", "X", "gap, mm", "share", tuple(range(8)), {}, "it helps")
-    steep, flat = shares(1, 1, 1, 1, 0, 0, 0, 0), shares(1, 1, 1, 1, 1, 1, 0.75, 0.5)
-    bars, words, heights = parts(knob_pictures.svg(knob, {"steep": steep, "flat": flat}))
-    assert bars == 4 * ["right"] + 4 * ["silent"] + 6 * ["right"] + 2 * ["silent"]
-    assert heights == [4 * [44] + 4 * [0], 6 * [44] + [33, 22]]
-    said = [word for _, word in words]
-    assert said.count("right") == said.count("wrong, not noticed") == 2
-    assert {"steep", "flat", "gap, mm", "0", "7"} <= set(said)
-    assert all(left < knob_pictures.LEFT for left, word in words if word in ("steep", "flat"))
 
 
 @pytest.mark.slow

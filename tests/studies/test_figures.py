@@ -1,4 +1,4 @@
-"""The figures in the pages are those the gateware gives."""
+"""The latency that pages promise of the reference Skin."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The command `contactfpga fit`, and its page."""
+"""The command `contactfpga fit`, and what its page quotes."""
 
 import json
 from pathlib import Path
@@ -20,9 +20,6 @@ pytestmark = pytest.mark.usefixtures("alone")
 
 UNSOLVED = 3
 ROOT = Path(__file__).resolve().parents[2]
-
-
-# ---- the command
 
 
 @pytest.mark.slow

@@ -256,7 +256,7 @@ def test_a_block_after_one_that_is_missing_does_not_count():
 def test_the_page_says_what_the_numbers_beside_it_say():
     rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
     assert [design.name for design in sizes] == list(DESIGNS)
-    assert not outdated("flips", computed=tables.FlipResults(rows, sizes))
+    assert not outdated("flips", tables.FlipResults(rows, sizes))
 
 
 def test_tables_count_what_came_out():

@@ -1,4 +1,4 @@
-"""The maker's page: its tables, its schematic, and its Skin, which the circuit model takes."""
+"""The maker's page: the values in its schematic, and its Skin, which the circuit model takes."""
 
 import re
 import tomllib

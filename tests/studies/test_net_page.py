@@ -1,4 +1,4 @@
-"""The page on networks: its tables and its picture show the same runs."""
+"""The picture of the page on networks shows the figures of its table."""
 
 from pathlib import Path
 

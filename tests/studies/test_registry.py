@@ -1,4 +1,5 @@
-"""The studies: each section of a page has one owner, and a toy study is made, listed and found out of date."""
+"""The studies: each section of a page has one owner and shows what its study makes; a toy study is made, listed and
+found out of date."""
 
 import functools
 import inspect

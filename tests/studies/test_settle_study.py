@@ -1,4 +1,4 @@
-"""Break points of a precharged scan: the page against a new run of what is quick, and against closed forms."""
+"""Break points of a precharged scan: found again where the page says, and against closed forms."""
 
 from pathlib import Path
 

@@ -98,6 +98,14 @@ def test_on_the_page_it_is_behind_no_other_at_any_rate():
             assert gained + half >= 0, row
 
 
+def test_on_the_page_it_is_ahead_in_the_mean_at_each_rate():
+    lines = section("tracking.md", "scores").splitlines()
+    means = [line[2:-2].split(" | ") for line in lines if line.startswith("| mean of all | ")]
+    assert [row[1] for row in means] == ["25", *PAGE_RATES]
+    for ours, *others in ([float(cell.strip("*")) for cell in row[2:6]] for row in means):
+        assert ours > max(others)
+
+
 def test_constant_velocity_goes_on_where_its_speed_puts_it():
     """A zone that moves by 3 cells a frame, hides for 3 frames and is there again; the nearest zone loses it."""
     for make, ids in ((scores.constant_velocity, {1}), (scores.TRACKERS["nearest zone"], {1, 2})):
