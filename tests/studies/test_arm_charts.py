@@ -73,7 +73,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     tasks = pictures.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
     few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})
     steps = []
-    with ThreadPoolExecutor(2) as workers:
+    with ThreadPoolExecutor(1) as workers:
         points = sweep.sweep(few.all, workers, lambda name, of: steps.append(of))
     assert steps == [len(few.all)] * len(few.all)
     found = dict(zip(few.all, points, strict=True))

@@ -412,9 +412,9 @@ def test_lines_of_the_table(verdicts, expected):
 
 @pytest.mark.slow
 def test_the_command_writes_a_study(tmp_path, capsys):
-    assert cli.main(["study", "failures", "--study", "ghosts", "--output", str(tmp_path)]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["failures.md", "ghosts.svg"]
-    assert (tmp_path / "ghosts.svg").read_text() == (PAGE.parent / "images" / "failures" / "ghosts.svg").read_text()
+    assert cli.main(["study", "failures", "--study", "ghost", "--output", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["failures.md", "ghost.svg"]
+    assert (tmp_path / "ghost.svg").read_text() == (PAGE.parent / "images" / "failures" / "ghost.svg").read_text()
     lines = (tmp_path / "failures.md").read_text().splitlines()[2:]
     assert lines
     shown = [line for name in ("failures", "unnoticed") for line in section("failures.md", name).splitlines()]
