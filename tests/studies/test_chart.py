@@ -160,6 +160,8 @@ def test_the_host_finds_the_zones_that_the_board_finds():
 def test_numbers_are_read_as_they_were_written(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         points = compute.study([task(), task("cells, 6.4 mm, tiles", "palm")], pool, with_size=False)
+    run, cells = map(host.timed, points)
+    assert run.host_us == 0 < cells.host_us  # which finds zones of cells itself
     numbers.write(points, tmp_path / "one.csv")
     back = numbers.read(tmp_path / "one.csv")
     numbers.write(back, tmp_path / "two.csv")
@@ -384,3 +386,12 @@ def test_the_pages_numbers_are_found_again(tmp_path):
     assert cli.main(["study", "chart", "--output", str(tmp_path)]) == 0
     for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / tables.NUMBERS), strict=True):
         assert dataclasses.replace(found, host_us=shown.host_us) == shown
+
+
+@pytest.mark.slow
+def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
+    monkeypatch.setattr(tables, "SHEETS", (16,))
+    monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
+    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in tables.host_table().splitlines()[2:]}
+    # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
+    assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
