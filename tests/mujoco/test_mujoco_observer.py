@@ -1,6 +1,4 @@
-"""The momentum observer that is set beside the sheet: right where it is told the truth, and the page's table."""
-
-from pathlib import Path
+"""The momentum observer that is set beside the sheet: right where it is told the truth."""
 
 import numpy as np
 import pytest
@@ -9,8 +7,7 @@ pytest.importorskip("mujoco")
 
 import mujoco
 
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.mujoco.collisions import AFTER_S, Arm, Collision, by_observer, by_sheet, observer_table
+from contactfpga_sim.lab.mujoco.collisions import AFTER_S, Arm, Collision, by_observer, by_sheet
 from contactfpga_sim.lab.mujoco.observer import CONTROL_S, Observer, Wrong
 
 TRUE = Wrong((1.0, 1.0), (1.0, 1.0), torque_nm=0.0, speed_rad_s=0.0)
@@ -61,10 +58,3 @@ def test_its_place_is_where_the_rod_is_and_the_sheets_too(arm):
     assert abs(felt.off_m) < 0.005
     assert 0 <= felt.late_s <= observed.late_s < 0.01 < AFTER_S
     assert felt.peak_n <= observed.peak_n < none.peak_n / 2
-
-
-@pytest.mark.campaign  # 6 minutes
-@pytest.mark.timeout(3600)
-def test_the_table_is_the_pages():
-    page = (Path(__file__).parents[2] / "docs" / "collisions.md").read_text()
-    assert writer.sections(page)["observer"].text == observer_table()

@@ -70,11 +70,6 @@ def test_without_a_reflex_it_pushes_on_and_the_push_is_physical():
     assert sum(speeds) / 2 == pytest.approx(0.8, rel=0.02)
 
 
-def test_follow_gives_way():
-    speeds = [pushed("Follow", 5.0, x_mm)[0] for x_mm in (X_MM, 3 * X_MM)]
-    assert sorted(speeds) == pytest.approx([-0.8, 0.8], abs=0.05)
-
-
 BEFORE_BAR = 0.5
 """An angle in rad from which the arm reaches the bar, at 0.54, within 0.1 s."""
 FOAM_N = 4 / 3 * 3.45e5 / 0.75 * 0.02**0.5
@@ -167,14 +162,6 @@ def test_an_obstacle_in_its_way_is_felt_and_stops_it(kind, half_mm):
     assert 0 < copy.sheets.data.qpos[0] < 0.4
     along_mm = 200.0 * np.cos(0.4 - copy.sheets.data.qpos[0]) - 80.0
     assert abs(state.zones[0].y_mm - along_mm) < 5.0 + half_mm
-
-
-def test_an_obstacle_is_not_felt_where_none_is_chosen():
-    source = started("Stop", angle=0.0)
-    goes_on(source, 0.2)
-    source.close()
-    assert source.copies[0].most_n["arm"] == 0.0
-    assert source.copies[0].sheets.data.qpos[0] == pytest.approx(0.16, rel=0.05)
 
 
 def test_an_obstacle_follows_the_mouse_no_faster_than_a_hand():
@@ -317,27 +304,3 @@ def test_a_click_in_a_browser_stops_the_arm():
         visitor.page.wait_for_selector("text=1 contact")
         visitor.page.get_by_role("button", name="Start again").click()
         until(visitor, lambda: command() == 0.8 and not source.links["arm"].fingers)
-
-
-@pytest.mark.campaign  # the same
-@pytest.mark.skipif(browser.program() is None, reason="no Chromium is installed")
-def test_a_ball_is_dragged_in_the_way_of_three_arms():
-    pytest.importorskip("playwright")
-    named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
-    with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
-        source = shown.source
-        browser.tidy(visitor)
-        visitor.choose(KIT, ALL)
-        until(visitor, lambda: len(source.copies) == 3)
-        visitor.choose(obstacle.NOTHING, obstacle.BALL)
-        until(visitor, lambda: source.obstacle.kind == obstacle.BALL)
-        visitor.page.wait_for_timeout(2000)
-        before = source.obstacle.at_m
-        after = before + [-0.05, -0.05, 0.0]
-        shift = shown.view.stage.at_m
-        visitor.drag_in_space(before + shift, after + shift)
-        until(visitor, lambda: np.allclose(source.obstacle.at_m, after, rtol=0, atol=0.02))
-        visitor.page.mouse.up()
-        assert source.obstacle.at_m == pytest.approx(after, abs=0.02), "it stays where it was left"
-        until(visitor, lambda: source.copies and all(copy.most_n["arm"] for copy in source.copies))
-        visitor.page.wait_for_selector("text=ms since the touch")

@@ -1,12 +1,10 @@
 """Families of scenes: the same ones for the same seed, on the sheet, and what their names say."""
 
 import itertools
-import pickle
 
 import numpy as np
 import pytest
 
-from contactfpga.design.cover import Cover, Switch
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
 
@@ -20,12 +18,6 @@ def test_the_same_seed_gives_the_same_scenes(family):
     assert scenes == placements(family, 6, 11, FINE)
     assert scenes[4:] == placements(family, 2, 11, FINE, first=4)
     assert len({repr(scene) for scene in (*scenes, *placements(family, 6, 12, FINE))}) == 12
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_scenes_can_be_sent_to_another_process(family):
-    scenes = placements(family, 2, 11, FINE)
-    assert pickle.loads(pickle.dumps(scenes)) == scenes
 
 
 def test_families_do_not_share_their_places():
@@ -117,14 +109,6 @@ def test_a_moving_finger_has_its_speed():
         step = 1e-5
         (before,), (after,) = (scene.truth(seconds).contacts for seconds in (0.4, 0.4 + step))
         assert np.hypot(after.x_mm - before.x_mm, after.y_mm - before.y_mm) / step == pytest.approx(300, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_families_press_through_any_cover():
-    cover = Cover("bonded", switch=Switch(0.05))
-    for family in FAMILIES:
-        cells = placements(family, 1, 7, FINE)[0].pressed(0.0, FINE, cover)
-        assert (cells.shape, cells.dtype, bool(cells.any())) == ((64, 64), bool, True)
 
 
 @pytest.mark.parametrize(

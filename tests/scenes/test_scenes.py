@@ -56,23 +56,12 @@ def test_a_foot_is_two_contacts_where_it_is_long_enough():
     assert scenes.sole(Skin()).truth(0.0, Skin()).count == 2
 
 
-def test_a_moving_contact_moves():
-    scene = scenes.scene(Skin(), "moving")
-    assert not np.array_equal(scene(0.0), scene(0.1))
-
-
 @pytest.mark.parametrize(
     ("name", "count"),
     [("spiral", 1), ("comb", 1), ("checkerboard", 1), ("nested_u", 4), ("rings", 4), ("tree", 1), ("dots", 64)],
 )
 def test_shapes_are_what_they_are_called(name, count):
     assert zones(SHAPES[name](16, 16)) == count
-
-
-def test_checkerboard_is_the_worst_case_of_4_connectivity_and_dots_of_8():
-    skin = Skin()
-    assert zones(SHAPES["checkerboard"](16, 16), 4) == skin.replace(connectivity=4).max_zones()
-    assert zones(SHAPES["dots"](16, 16), 8) == skin.max_zones()
 
 
 def test_variants_are_flips_and_transposes_without_doubles():
@@ -205,16 +194,6 @@ def test_a_pair_is_two_from_the_gap_on(angle):
         contacts.pair(-12.0, 6.0, 40, 30)
 
 
-def test_zones_of_a_pair_need_a_free_column():
-    # Along the rows a gap of a pitch holds a column for certain, and a narrower one if the pair lies well.
-    skin = sheet_of(2.0)
-    for gap, counts in ((-1.0, {1}), (1.0, {1, 2}), (2.001, {2})):
-        found = {
-            zones(Scene(contacts.pair(gap, 6.0, 40 + shift, 40)).pressed(0.0, skin)) for shift in np.arange(0, 2, 0.1)
-        }
-        assert found == counts, gap
-
-
 # ---- cells against the continuous shape
 
 
@@ -229,20 +208,6 @@ def test_moved_by_one_pitch_the_cells_move_by_one_switch(model):
         assert np.array_equal(moved.pressed(0.0, skin, cover), np.roll(here, (rows, columns), axis=(0, 1)))
     assert here.sum() > 5
     assert not here[[0, 1, -1, -2]].any()
-
-
-@pytest.mark.parametrize("model", ["patch", "point", "hertz", "bonded"])
-def test_symmetric_contacts_press_symmetric_cells(model):
-    skin = sheet_of(2.0, size=33)
-    cover = Cover(model, switch=small_face(0.1))
-    for shape in (contacts.disc(13.1), contacts.ellipse(20.1, 7.3), contacts.edge(30.3, 8.3)):
-        cells = one(shape, 32, 32, force_n=60.0).pressed(0.0, skin, cover)
-        assert np.array_equal(cells, cells[::-1])
-        assert np.array_equal(cells, cells[:, ::-1])
-        turned = one(shape, 32, 32, force_n=60.0, angle_deg=90.0).pressed(0.0, skin, cover)
-        # Turned by 90 degrees the sine and cosine are off by their rounding, and so may be a cell on the rim.
-        assert (turned != cells.T).sum() <= 4
-        assert cells.any()
 
 
 def disc_on_a_grid(ratio, cover, steps=120):
@@ -309,37 +274,6 @@ def test_cells_come_to_the_truth_as_the_pitch_goes_to_nothing():
         assert (gain < 2 * factor**1.5).all()
     assert errors[0.125][0] < 1e-3
     assert errors[0.125][1:].max() < 5e-3
-
-
-def test_more_force_closes_more_switches_and_a_thicker_cover_fewer():
-    skin = sheet_of(1.0)
-    for model in ("point", "hertz", "bonded"):
-        counts = [
-            int(
-                one(contacts.disc(5), 24, 24, force_n=force)
-                .pressed(0.0, skin, Cover(model, switch=small_face(0.2)))
-                .sum()
-            )
-            for force in (0.5, 2, 5, 20)
-        ]
-        assert counts == sorted(counts)
-        assert counts[0] == 0 < counts[2] < counts[3]
-    thin, thick = (
-        one(contacts.disc(5), 24, 24, force_n=8.0).pressed(0.0, skin, Cover("bonded", z, small_face(1.0)))
-        for z in (2e-3, 9e-3)
-    )
-    assert thin.sum() > 0 == thick.sum()
-
-
-def test_any_pitch_sees_the_same_contact():
-    truth = scenes.fingertip(Skin()).truth(0.0)
-    for pitch_x, pitch_y in ((0.7, 1.3), (2.0, 0.9)):
-        skin = Skin(rows=64, columns=64, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y, settle_us=20.0)
-        scene = one(contacts.disc(12), 20, 25)
-        cells = scene.pressed(0.0, skin)
-        assert cells.sum() * pitch_x * pitch_y == pytest.approx(truth.area_mm2, rel=0.03)
-        assert np.nonzero(cells)[1].mean() * pitch_x == pytest.approx(20, abs=0.2)
-        assert np.nonzero(cells)[0].mean() * pitch_y == pytest.approx(25, abs=0.2)
 
 
 def test_the_truth_on_a_sheet_ends_half_a_pitch_beyond_its_switches():

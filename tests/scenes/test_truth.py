@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy import integrate, ndimage
+from scipy import ndimage
 
 from contactfpga.design.cover import Ellipse, Rectangle
 from contactfpga_sim.model.scenes.truth import TOUCH_M, Box, truth_of
@@ -142,35 +142,6 @@ def test_random_scenes_against_a_raster(record_property):
             assert got[2] == pytest.approx(want[2], rel=5e-3, abs=0.05)
     assert compared > 20
     record_property("cases", compared)
-
-
-@pytest.mark.slow
-def test_random_scenes_against_adaptive_quadrature(record_property):
-    # The rows' union by sorting in plain Python, and scipy's adaptive rule: to the accuracy that is promised.
-    def width(parts, box, y):
-        spans = []
-        for part in parts:
-            left, right = (float(end) for end in part.span(np.array(y)))
-            left, right = max(left, box.left), min(right, box.right)
-            if left < right:
-                spans.append((left, right))
-        total, reached = 0.0, -math.inf
-        for left, right in sorted(spans):
-            total += max(0.0, right - max(left, reached))
-            reached = max(reached, right)
-        return total
-
-    box = Box(0.0, 0.05, 0.005, 0.055)
-    for seed in range(25):
-        parts = random_parts(np.random.default_rng(1000 + seed))
-        ends = sorted({y for part in parts for y in (part.y_m - part.half_box_m[1], part.y_m + part.half_box_m[1])})
-        ends = [box.top, *(y for y in ends if box.top < y < box.bottom), box.bottom]
-        area = sum(
-            integrate.quad(lambda y, parts=parts: width(parts, box, y), low, high, limit=400, epsabs=1e-13)[0]
-            for low, high in itertools.pairwise(ends)
-        )
-        assert truth_of(parts, box).area_mm2 == pytest.approx(area * 1e6, rel=1e-7, abs=1e-6)
-    record_property("cases", 25)
 
 
 @pytest.mark.parametrize("make", [Ellipse, Rectangle])

@@ -10,7 +10,6 @@ from reversal import FAST
 from contactfpga.design.circuit import Circuit, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
-from contactfpga.skin import Skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet.line import ColumnLine, RowLine, lines_of
 from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
@@ -121,55 +120,6 @@ def test_wiring_is_what_the_circuit_comes_to():
         assert (amperes > 5e-3) == bool(undefined.any())
         fights += int(undefined.any())
     assert 0 < fights < 40
-
-
-@pytest.mark.campaign  # test_failures.py has settle times, too
-def test_a_column_rises_and_falls_as_the_closed_form_says():
-    """The row that reads a neighbor's switch, and the row that misses its own, change where the exponentials say."""
-    skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
-    cells = np.array([[True], [False]])
-
-    def read(press_s, rest, release_s):
-        with CompiledBoard(skin, capture=("rows",)) as board:  # from power-up: all columns are up
-            board.settle(ColumnLine((press_s, press_s), (rest, rest), release_s, 0.5))
-            board.hold(cells[None], 3 * 2 * 72)
-            events = board.take("rows")
-        return [int(data) for data in events["data"][:2]]
-
-    slowest = 6e-6 / np.log(0.99 / 0.5)
-    assert read(1e-9, 0.99, slowest * 0.99) == [1, 0]
-    assert read(1e-9, 0.99, slowest * 1.01) == [1, 1]
-    longest = 5e-6 / -np.log(1 - 0.5 / 0.7)
-    assert read(longest * 0.99, 0.7, 1e-9)[0] == 1
-    assert read(longest * 1.01, 0.7, 1e-9)[0] == 0
-    assert read(1e-9, 0.49, 1e-9) == [0, 0]  # a level that stays below the threshold
-
-
-@pytest.mark.campaign  # test_settling.py has an image of settle times
-def test_a_compiled_board_settles_when_its_circuit_does():
-    """A row is missed where the model needs more than the settle time, by how many of its switches are pressed."""
-    skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
-    levels = Levels.of(Circuit())
-
-    def takes(circuit):
-        return phases.passed(phases.settle(Network(circuit, np.ones((2, 1), bool)), levels)).seconds
-
-    def reads(circuit):
-        with CompiledBoard(skin, capture=("rows",)) as board:
-            board.settle(ColumnLine.of(circuit, 2, 1))
-            board.hold(np.ones((1, 2, 1), bool), 3 * 2 * 72)
-            return int(board.take("rows")["data"][0])
-
-    slow = Circuit(switch_ohm=10_000.0, column_pull_ohm=1e6, line_pf=290.0)
-    assert takes(slow) < 4.95e-6 < 5.1e-6 < takes(slow.replace(line_pf=310.0))
-    assert [reads(slow), reads(slow.replace(line_pf=310.0))] == [1, 0]
-
-
-def test_more_pressed_switches_make_a_row_slower():
-    line = ColumnLine.of(Circuit(column_pull_ohm=20_000.0), 8, 8)
-    assert len(line.press_s) == len(line.pulled) == 9
-    assert line.press_s[8] > 1.5 * line.press_s[1]
-    assert line.pulled[8] < line.pulled[1]
 
 
 AT_ONCE = ColumnLine((1e-12,) * (FAST.columns + 1), (1.0,) * (FAST.columns + 1), 1e-12, 0.5)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -61,30 +60,6 @@ def test_the_consistent_set_is_reproduced(ours, oracle, name, stated, tolerance)
     assert found == pytest.approx(getattr(oracle, name), rel=1e-3, abs=step)
 
 
-def test_the_sensor_falls_while_the_force_still_rises(ours):
-    course, outcome = ours.course, ours.outcome
-    during = course[(course["time_s"] > outcome.reacts_s) & (course["time_s"] < outcome.reacts_s + outcome.positive_s)]
-    assert (np.diff(during["force_n"]) > 0).all()
-    first = during[during["time_s"] < outcome.reacts_s + 0.25e-3]
-    assert (np.diff(first["sensor_nm"]) < 0).all()
-    assert outcome.torque_after_nm < 0.1 * outcome.torque_before_nm
-
-
-def test_the_paper_reads_12_n_as_the_closing_force_and_that_is_run_too():
-    """(9): a switch 3.6344 mm beside the contact closes at 12 N; with 6 ms more the torque limit would come first."""
-    offset = Case.load("paper-offset")
-    alone = offset.but(control={"torque_limit_nm": 100.0, "sensor_nm": 100.0})
-    found = run(alone, "latency", latency_s=LATENCY_S).outcome
-    again = paper_set(force_to_close=12.0)
-    for name in ("closes_s", "reacts_s", "torque_before_nm", "positive_s", "peak_force_n"):
-        assert getattr(found, name) == pytest.approx(getattr(again, name), rel=2e-3), name
-    assert found.force_before_n > 1.9 * 12
-    limited = run(offset, "latency", latency_s=LATENCY_S).outcome
-    assert limited.reason == "torque"
-    assert limited.reacts_s < found.reacts_s
-    assert limited.peak_force_n < found.peak_force_n
-
-
 def free(**changes):
     """Nothing but arm, rotor and foam."""
     return PAPER.but(control=IDLE, **changes)
@@ -136,15 +111,6 @@ def test_damped_foam_on_an_arm_that_gives_way_against_a_second_integration():
     assert result.outcome.peak_indentation_m == pytest.approx(depth.max(), rel=1e-5)
     rigid = run(free(run={"duration_s": 0.05}), "torque").outcome
     assert result.outcome.peak_force_n < 0.9 * rigid.peak_force_n
-
-
-def test_the_current_follows_its_loop():
-    plant, motor = Plant(free()), PAPER.motor
-    state, seconds = (-0.1, 0.3, 0.0), 0.0
-    for number in range(1, 51):
-        state = plant.step(seconds, state, 0.5, 10e-6)
-        seconds = number * 10e-6
-        assert state[2] == pytest.approx(0.5 * (1 - math.exp(-seconds / motor.time_constant_s)), rel=1e-5)
 
 
 def test_the_supply_limits_how_fast_the_current_rises():

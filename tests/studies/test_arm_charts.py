@@ -1,26 +1,20 @@
-"""The arm's charts, and the page on it: what latency costs, point by point."""
+"""The arm's charts: what latency costs, point by point."""
 
 import csv
 import dataclasses
 import math
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import section
 
-from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import SweepTask
-from contactfpga_sim.lab.registry import StudyRun
-from contactfpga_sim.lab.studies import STUDIES
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -45,15 +39,6 @@ def test_the_naive_speed_is_the_papers_bound_and_no_safe_one():
     assert sweep.closing_n(PAPER) == pytest.approx(4.15555, abs=5e-6)
     assert sweep.naive_speed(PAPER, 15.0, 6e-3) == pytest.approx(0.240, abs=5e-4)
     assert run(PAPER, "latency", latency_s=6e-3).outcome.peak_force_n > 15
-
-
-@pytest.mark.slow
-def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
-    bounds = sweep.bounds_s(PAPER, Skin())
-    for way, name in (("uart", "UART"), ("pin", "pin")):
-        result = run(PAPER, way).outcome
-        assert 0 < result.detected_s - result.closes_s <= bounds[name]
-    assert bounds["UART"] > bounds["last byte"] > bounds["pin"]
 
 
 @pytest.mark.slow
@@ -84,18 +69,11 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
 
 
 @pytest.mark.slow
-def test_the_arm_needs_no_more_than_the_simulation():
-    arm = "contactfpga_sim.lab.arm"
-    code = f"import sys, contactfpga.tools.cli, {arm}.pictures; sys.exit('scipy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-@pytest.mark.slow
 def test_charts_of_a_few_points(nothing_kept, tmp_path):
     tasks = pictures.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
     few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})
     steps = []
-    with ThreadPoolExecutor(2) as workers:
+    with ThreadPoolExecutor(1) as workers:
         points = sweep.sweep(few.all, workers, lambda name, of: steps.append(of))
     assert steps == [len(few.all)] * len(few.all)
     found = dict(zip(few.all, points, strict=True))
@@ -109,26 +87,8 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
     paths = pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))
     assert [path.name for path in paths] == ["arm-force.svg", "arm-thickness.svg"]
-    texts = [path.read_text() for path in paths]
-    assert all("<svg" in text for text in texts)
-    assert "paper: 12 N when it reacts, after 6 ms" in texts[0]
-    assert pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
+    assert "paper: 12 N when it reacts, after 6 ms" in paths[0].read_text()
     text = pictures.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
     lines = list(csv.DictReader(text.splitlines()))
     assert len(lines) == len(found)
     assert float(lines[1]["peak_force_n"]) == pytest.approx(at.peak_force_n, rel=1e-5)
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(3600)
-def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
-    run = StudyRun(STUDIES["arm"])
-    assert {name: run.text(name) for name in run.study.sections} == {
-        name: section("arm.md", name) for name in run.study.sections
-    }
-    drawn = run.call(run.study.pictures, tmp_path)
-    assert len(drawn) == 4
-    for picture in drawn:
-        assert picture.read_text() == (Path(__file__).parents[2] / "docs/images" / picture.name).read_text(), (
-            picture.name
-        )

@@ -2,10 +2,8 @@
 
 import math
 
-import numpy as np
 import pytest
 from sample import sample
-from scipy.optimize import brentq
 
 from contactfpga.design.cover import point
 from contactfpga.design.cover.point import Switch
@@ -39,45 +37,6 @@ def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
     assert alone.reason == ""
 
 
-@pytest.mark.slow
-def test_by_the_patchs_pressure_the_switch_closes_at_29_n_which_the_limit_does_not_wait_for():
-    """Huber's stress below a Hertz patch of R* = 38 mm, by hand, over a face of 12.6 mm2: 1 N."""
-    wide = PAPER.but(model="hertz", control=UNLIMITED, link={"speed_m_s": 0.3}, run={"duration_s": 0.04})
-    course = run(wide, "torque").course
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    half = math.sqrt(12.6e-6) / 2
-    r2 = half**2 * np.add.outer(nodes**2, nodes**2)
-
-    def above(force):
-        a2 = (0.75 * force * 0.038 / (PAPER.foam.stiffness * 0.75 / math.sqrt(0.038))) ** (2 / 3)
-        z2 = 25e-6
-        excess = r2 + z2 - a2
-        u = (excess + np.sqrt(excess**2 + 4 * a2 * z2)) / 2
-        stress = 1.5 * force / (math.pi * a2) * (z2 / u) ** 1.5 * a2 * u / (u**2 + a2 * z2)
-        return half**2 * weights @ stress @ weights - 1.0
-
-    closing = brentq(above, 1.0, 100.0)
-    assert course["force_n"][course["closed"].argmax()] == pytest.approx(closing, rel=2e-2)
-    outcome = run(PAPER.but(model="hertz"), "latency").outcome
-    assert (outcome.reason, outcome.closes_s) == ("torque", None)
-
-
-@pytest.mark.slow
-def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
-    outcomes = [run(PAPER.but(link={"speed_m_s": speed}), "latency").outcome for speed in (0.3, 0.4, 0.5, 0.6)]
-    flat = [outcome.peak_indentation_m > 5e-3 for outcome in outcomes]
-    assert [outcome.bottomed for outcome in outcomes] == flat
-    assert flat == sorted(flat)
-    assert flat[0] is False
-    assert flat[-1] is True
-    hertz = [PAPER.foam.stiffness * outcome.peak_indentation_m**1.5 for outcome in outcomes]
-    for outcome, spring in zip(outcomes, hertz, strict=True):
-        if outcome.bottomed:
-            assert outcome.peak_force_n > 2 * spring
-        else:
-            assert outcome.peak_force_n == pytest.approx(spring, rel=1e-9)
-
-
 BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 
 
@@ -90,53 +49,6 @@ def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
     waiting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 2e-3}), way)
     assert waiting.outcome.reversals == 1
     assert waiting.outcome.reacts_s == hunting.outcome.reacts_s
-
-
-@pytest.mark.campaign
-def test_the_boards_debounce_ends_the_hunting_by_uart_but_not_by_the_pin_which_is_not_debounced():
-    skin = Skin(debounce="asym_eager_defer_pk", debounce_press_us=2000.0, debounce_release_us=2000.0)
-    case = PAPER.but(switch=BOUNCING, control={"clear_s": 0.0})
-    by_uart, by_pin = run(case, "uart", skin=skin).outcome, run(case, "pin", skin=skin).outcome
-    assert by_uart.reversals == 1
-    assert by_uart.reacts_s == run(case, "uart").outcome.reacts_s  # eager: no later
-    assert by_pin.reversals > 3
-
-
-def delay_margin_s(case):
-    """How much later the measured speed may come until the loop through PI, current and inertia has no phase left.
-
-    A sampled loop holds its output for a period, half of which counts as delay.
-    """
-    motor, control = case.motor, case.control
-    inertia = case.link.inertia_kgm2 + motor.gear**2 * motor.rotor_kgm2
-
-    def loop(w):
-        s = 1j * w
-        pi = control.proportional + control.integral / s
-        lag = 1 + s * motor.inductance_h / (motor.resistance_ohm + motor.current_gain)
-        return motor.gear * motor.torque_constant * pi / lag / (inertia * s)
-
-    crossover = brentq(lambda w: abs(loop(w)) - 1, 1.0, 1e5)
-    return (math.pi + np.angle(loop(crossover))) / crossover - control.period_s / 2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("proportional", sample([3.0, 6.0], quick=[6.0]))
-def test_the_speed_loop_oscillates_from_the_latency_on_that_its_phase_margin_says(proportional):
-    def swing(delay_periods):
-        """Largest error of the speed soon after the arm turned back and left the contact, and half a second later."""
-        back = {"clear_s": 9.0, "retreat_m": 9.0, "delay_s": delay_periods * 0.25e-3, "proportional": proportional}
-        case = PAPER.but(control={**UNLIMITED, **back}, run={"step_s": 25e-6, "duration_s": 0.55})
-        course = run(case, "latency").course
-        error = np.abs(course["speed_rad_s"] + 0.23 / 0.2)
-        time = course["time_s"]
-        return error[(time > 0.04) & (time < 0.06)].max(), error[time > 0.53].max()
-
-    margin = delay_margin_s(PAPER.but(control={"proportional": proportional})) / 0.25e-3
-    for periods, stays in ((math.floor(0.9 * margin), False), (math.ceil(1.1 * margin), True)):
-        early, late = swing(periods)
-        assert (late > 0.1) == stays, (periods, early, late)
-        assert late > 0.5 * early or not stays
 
 
 def test_a_step_that_is_too_long_is_refused_and_would_blow_up():
@@ -166,24 +78,6 @@ def test_two_contacts_at_once_are_two_zones_and_both_are_left():
     peaks = sum(PAPER.foam.stiffness * depth**1.5 for depth in apart)  # both are deepest at the same moment
     assert outcome.peak_force_n == pytest.approx(peaks, rel=1e-9)
     assert outcome.resolved_s < result.events[1][0]
-
-
-@pytest.mark.slow
-def test_the_torque_limit_lets_a_contact_near_the_joint_have_more_force():
-    """3 Nm are 15 N at 0.2 m, but 30 N at 0.1 m; the sheet does not care."""
-    far, near = ({"x_mm": 85.0, "y_mm": 85.0, "lever_m": lever} for lever in (0.2, 0.1))
-    forces = [run(PAPER.but(touch=(one,), link={"speed_m_s": 0.4}), "torque").outcome for one in (far, near)]
-    assert forces[1].force_before_n > 1.7 * forces[0].force_before_n
-    assert forces[0].reason == forces[1].reason == "torque"
-
-
-@pytest.mark.slow
-def test_a_contact_between_switches_beside_one_on_a_switch_is_not_seen_but_is_left_all_the_same():
-    two = PAPER.but(touch=({}, {"x_mm": 25.0, "y_mm": 25.0}))
-    outcome = run(two, "uart").outcome
-    assert outcome.zones == 1
-    assert outcome.reason == "contact"
-    assert outcome.rest_s is not None
 
 
 def test_a_saturated_sensor_still_trips_the_limit_and_a_limit_it_cannot_read_is_refused():

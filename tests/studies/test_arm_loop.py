@@ -1,9 +1,6 @@
 """The arm's loop through the compiled gateware and the real driver, against the golden model and simple sums."""
 
-import dataclasses
 import functools
-import itertools
-import time
 
 import numpy as np
 import pytest
@@ -13,7 +10,6 @@ from contactfpga.skin.latency import latency_s
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.world import Faults
-from contactfpga_sim.lab.usb import BridgeChip
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict
 
@@ -77,14 +73,6 @@ def test_the_usb_chip_and_the_host_add_their_time(by_uart, golden):
     assert by_uart.outcome.detected_s > direct().detected_s
 
 
-def test_what_comes_together_in_a_usb_packet_is_heard_at_once(by_uart):
-    times = [at for at, _ in by_uart.heard if at > 0]
-    packets = np.array([at for at, _ in itertools.groupby(times)])
-    assert (np.diff(packets) >= PAPER.usb.timer_s - STEP).all()
-    counts = [len(list(group)) for _, group in itertools.groupby(times)]
-    assert max(counts) == 11  # frames take 96 us, the timer 1 ms
-
-
 def test_detection_is_no_later_than_the_sum_of_its_bounds(by_pin, by_uart):
     scan = SKIN.derived.frame_clocks / SKIN.clock_hz
     assert by_pin.outcome.detected_s - by_pin.outcome.closes_s <= scan + 3e-6
@@ -93,16 +81,6 @@ def test_detection_is_no_later_than_the_sum_of_its_bounds(by_pin, by_uart):
     assert by_uart.outcome.detected_s - by_uart.outcome.closes_s <= bound
     for outcome in (by_pin.outcome, by_uart.outcome):
         assert 0 <= outcome.reacts_s - outcome.detected_s <= PAPER.control.period_s
-
-
-def test_sooner_is_softer(by_pin, by_uart):
-    alone = paper("torque").outcome
-    late = paper("latency").outcome
-    forces = [one.peak_force_n for one in (by_pin.outcome, by_uart.outcome, late, alone)]
-    assert forces == sorted(forces)
-    assert forces[0] < 0.6 * forces[2]
-    assert alone.reason == "torque"
-    assert alone.detected_s is None
 
 
 @pytest.mark.parametrize("way", ["latency", "pin", "uart", "torque"])
@@ -125,56 +103,3 @@ def test_a_byte_damaged_on_the_wire_costs_a_frame(golden):
     noisy = run(DIRECT, "uart", faults=Faults(noise_s=(first - 8.5 * byte, first - 7.5 * byte))).outcome
     assert noisy.detected_s - clean.detected_s == pytest.approx(second - first, abs=2 * STEP)
     assert noisy.reacts_s >= clean.reacts_s
-
-
-def test_noise_delays_the_reaction_and_costs_force(by_uart):
-    noise = Faults(noise_s=(by_uart.outcome.closes_s, by_uart.outcome.closes_s + 4e-3))
-    noisy = run(PAPER, "uart", faults=noise).outcome
-    assert noisy.detected_s > noise.noise_s[1]
-    assert noisy.reason == "contact"
-    assert noisy.peak_force_n > 1.3 * by_uart.outcome.peak_force_n
-
-
-@pytest.mark.parametrize("timer_ms", [1, 16])
-def test_the_chip_sends_when_its_timer_runs_out_or_a_packet_is_full(timer_ms):
-    """A byte a microframe of 125 us; and 600 of them at once."""
-    usb = dataclasses.replace(PAPER.usb, timer_s=timer_ms * 1e-3)
-    chip, came = BridgeChip(usb.packet_bytes, usb.timer_s), []
-    for frame in range(1, 1200):
-        if frame < 1000:
-            chip.put((frame - 0.5) * usb.frame_s, frame % 256)
-        if frame == 644:
-            for _ in range(600):
-                chip.put((frame - 0.5) * usb.frame_s, 0)
-        came.append(len(b"".join(chip.take(frame * usb.frame_s))))
-    period = timer_ms * 8
-    assert [frame + 1 for frame in range(640) if came[frame]] == list(range(period, 641, period))
-    assert set(came[:640]) == {0, period}
-    assert came[643] == 510
-    assert sum(came) == 999 + 600
-
-
-@pytest.mark.slow
-def test_a_latency_timer_left_at_16_ms_costs_what_a_full_packet_takes(golden, by_uart):
-    """A frame of 17 bytes every 96 us fills a packet in 3 ms, which is sooner; still it costs force."""
-    leads = [LEAD + 4 * number * PAPER.control.period_s for number in range(3)]
-    outcomes = [run(PAPER.but(usb={"timer_s": 16e-3}, run={"lead_s": lead}), "uart").outcome for lead in leads]
-    full = 510 / 17 * SKIN.derived.frame_clocks / SKIN.clock_hz
-    worst = max(one.detected_s for one in outcomes) - frame_ends(golden)[0]
-    assert PAPER.usb.timer_s + PAPER.usb.frame_s + PAPER.usb.host_s < worst < full + 3 * PAPER.usb.frame_s
-    assert max(one.peak_force_n for one in outcomes) > by_uart.outcome.peak_force_n + 1
-
-
-@pytest.mark.slow
-def test_halving_the_step_changes_nothing_by_more_than_a_hundredth_through_the_gateware(by_uart):
-    fine = run(PAPER.but(run={"step_s": STEP / 2}), "uart").outcome
-    for field in dataclasses.fields(fine):
-        value = getattr(fine, field.name)
-        found = getattr(by_uart.outcome, field.name)
-        assert found == (pytest.approx(value, rel=0.01) if isinstance(value, float) else value), field.name
-
-
-def test_a_whole_run_takes_seconds(by_uart):
-    started = time.process_time()
-    run(PAPER, "uart")
-    assert time.process_time() - started < 10

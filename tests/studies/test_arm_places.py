@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.arm import anywhere, places
 from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
-from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Peaks
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.world import Switches, pressed
@@ -64,13 +63,6 @@ def test_a_lower_threshold_raises_no_touchs_peak(face):
         forces.append([force for force, _, _ in found])
     assert all((np.array(lower) <= np.array(higher) + 1e-9).all() for higher, lower in itertools.pairwise(forces))
     assert np.mean(forces[2]) < np.mean(forces[0]) - 0.5
-
-
-def test_a_longer_latency_raises_no_touchs_peak_and_the_limit_alone_is_the_worst():
-    found = places._touched(places.Batch(BEST.case(), tiled(), ((0.1e-3,), (3e-3,), (6e-3,), ()), 3, 1))
-    forces = np.array([[force for force, _, _ in way] for way in found])
-    assert (np.diff(forces, axis=0) >= 0).all()
-    assert [[limited for _, _, limited in way] for way in found] == [[False] * 3] * 3 + [[True] * 3]
 
 
 def test_places_phases_and_latencies_fill_their_ranges_evenly():
@@ -143,13 +135,6 @@ def test_the_sentence_names_what_takes_the_most():
     assert "What matters most is the latency: pin" in anywhere.matters(made_up(latency))
 
 
-def test_every_effect_changes_one_thing_alone():
-    for base in (PAPER, BEST):
-        assert base in GEOMETRIES
-        factors = [effect.factor for effect in anywhere.effects(made_up({}), base)]
-        assert set(factors) == {*anywhere.FACTORS.values(), "latency"}
-
-
 def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
     path = tmp_path / "tiles.toml"
     path.write_text(
@@ -157,11 +142,6 @@ def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
         "[switch]\nforce_n = 0.4\ntravel_m = 0.2e-3\nspread = 0.1\n"
     )
     assert Case.load(path) == BEST.case().but(cap={"side_m": 0.0058})
-
-
-def test_two_touches_have_no_place_anywhere():
-    with pytest.raises(CaseError, match="--places 0"):
-        places.check(Case.load("paper").but(touch=({}, {"x_mm": 20.0})))
 
 
 @pytest.mark.slow
@@ -189,12 +169,3 @@ def test_the_gateware_takes_no_longer_than_its_bounds():
         found = places.measured_s(case, Skin(), way)
         assert len(found) == places.INSTANTS
         assert 0 < min(found) < max(found) <= bounds[name]
-
-
-def test_batches_of_several_cases_come_back_by_their_names(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
-    tasks = {latency: places.batches(BEST.case(), tiled(), ((latency,),), 4) for latency in (1e-3, 5e-3)}
-    with ThreadPoolExecutor(1) as workers:
-        found = anywhere.many(tasks, workers)
-    assert [len(half.force_n) for half in found[1e-3][0]] == [2, 2]
-    assert anywhere.mean_n(found[1e-3][0]) < anywhere.mean_n(found[5e-3][0]) - 3

@@ -1,20 +1,15 @@
 """The arm's second line of defense: a force threshold of pressure units, compared by the board itself."""
 
-from pathlib import Path
-
 import pytest
-from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab.arm import report
 from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.run import WITH_UNITS, run
 from contactfpga_sim.lab.arm.world import THRESHOLD_N, UnitsUnderSheet
 
 PAPER = Case.load("paper").but(run={"duration_s": 0.03})
 HALFWAY = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "arm.md").read_text(encoding="utf-8")
 
 
 def test_units_share_a_push_by_its_place():
@@ -35,13 +30,6 @@ def test_a_force_threshold_reacts_where_no_switch_closes():
     assert THRESHOLD_N - 0.5 < result.course["force_n"][before].max() < THRESHOLD_N + 1.0
     assert outcome.peak_force_n < 10
     assert run(HALFWAY, "torque").outcome.peak_force_n > 20
-
-
-@pytest.mark.campaign
-def test_the_page_has_what_a_run_gives():
-    table = section("arm.md", "defense")
-    lines = report.defense_lines(Case.load("paper"))
-    assert table.splitlines()[2:] == [f"| {' | '.join(line)} |" for line in lines[1:]]
 
 
 def test_a_board_without_the_plain_sum_is_refused(capsys):

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 from scipy import ndimage
 from scipy.stats import binomtest
-from study_pages import section
+from study_pages import outdated
 
 from contactfpga.design.cover import Cells
-from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.lab import kept, writer
+from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import (
     beside,
     compute,
@@ -33,8 +32,8 @@ from contactfpga_sim.lab.chart import (
     times_picture,
 )
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.errors import Blob, Interval
-from contactfpga_sim.lab.chart.methods import EXTENT_MM, METHODS, PITCHES_MM, sheet
+from contactfpga_sim.lab.chart.errors import Blob
+from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.chart.rivals import RIVALS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
@@ -74,18 +73,6 @@ def test_found_and_there_are_paired_at_the_least_total_distance():
         assert got.barycenter_mm * len(few) == pytest.approx(least)
         assert got.missed == pytest.approx(max(0, there_count - found_count) / there_count)
         assert got.miscounted == (found_count != there_count)
-
-
-def test_what_is_not_there_has_no_distance():
-    nothing = errors.errors([], [Blob(1.0, 0.0, 0.0)])
-    assert nothing.missed == 1
-    assert nothing.miscounted
-    assert math.isnan(nothing.barycenter_mm)
-    assert math.isnan(nothing.area)
-
-
-def test_area_errors_are_relative_to_what_is_there():
-    assert errors.errors([Blob(150.0, 3.0, 4.0)], [Blob(100.0, 0.0, 0.0)]) == errors.Errors(False, 0.0, 5.0, 0.5)
 
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 1000), (1, 1000), (500, 1000), (7, 7)])
@@ -138,18 +125,9 @@ def test_a_board_that_takes_longer_is_noticed(monkeypatch):
         speed.touch(SMALL, cells, 0.5, check=True)
 
 
-def test_no_touch_is_faster_than_the_bound():
-    cells = np.zeros((8, 8), bool)
-    cells[0, 0] = True
-    assert speed.measure(SMALL, [cells] * 9, 0).bound_us < speed.measure(SMALL, [cells] * 9, 0).median_us
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "skin", [METHODS["adaptive, 10 mm, tiles"].skin, sheet(5.0, scan="adaptive", clock_hz=24_000_000)]
-)
-def test_a_frame_of_an_adaptive_scan_takes_at_most_25_clocks_more_than_the_bound(skin, record_property):
-    over = []
+def test_a_frame_of_an_adaptive_scan_takes_at_most_25_clocks_more_than_the_bound(record_property):
+    skin, over = METHODS["adaptive, 10 mm, tiles"].skin, []
     for scene in (fingertip, two_fingers, palm, edge):
         cells = scene(skin).pressed(0.0, skin)
         _, size = speed.touch(skin, cells, 0.3)
@@ -179,16 +157,11 @@ def test_the_host_finds_the_zones_that_the_board_finds():
             np.testing.assert_allclose(sorted(host.zones(cells, connectivity)), sorted(want), atol=1e-12)
 
 
-def test_the_host_takes_time_for_cells_only():
-    with ThreadPoolExecutor(1) as pool:
-        run, cells = compute.study([task(), task("cells, 6.4 mm, tiles")], pool, with_size=False)
-    assert host.timed(run).host_us == 0
-    assert 1 < host.timed(cells).host_us < 1000
-
-
 def test_numbers_are_read_as_they_were_written(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         points = compute.study([task(), task("cells, 6.4 mm, tiles", "palm")], pool, with_size=False)
+    run, cells = map(host.timed, points)
+    assert run.host_us == 0 < cells.host_us  # which finds zones of cells itself
     numbers.write(points, tmp_path / "one.csv")
     back = numbers.read(tmp_path / "one.csv")
     numbers.write(back, tmp_path / "two.csv")
@@ -210,25 +183,6 @@ def test_exact_labellers_add_no_error_and_the_others_do():
     for name in names:
         assert found[name]["sensing"] == found[names[0]]["sensing"]
     assert sum(found[names[-1]]["total"]["miscounted"]) > 50
-
-
-BARE = {
-    "bumper": (0.026, 0.005, 1.89542, 0.137761),
-    "fingers": (0.241, 0.0745667, 2.73048, 0.282143),
-    "pair": (0.102, 0.054, 3.09844, 0.226758),
-    "edge": (0.446, 0.0, 6.64045, 0.249214),
-}
-"""Miscounted, missed, barycenter and area of 1,000 scenes with seed 0, as the chart had them for 4-connected cells
-10 mm apart when it knew neither covers nor forces."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("family", BARE)
-def test_the_bare_sheet_errs_as_it_did_before_there_were_covers(family):
-    whole = Task("run, 10 mm, bare", *METHODS["run, 10 mm, bare"], family, 1000, 0, checked=0)
-    pieces = [compute.accuracy(whole, first) for first in range(0, 1000, compute.PIECE)]
-    found = compute.intervals(pieces)["total"]
-    assert [found[name].mean for name in errors.METRICS] == pytest.approx(BARE[family], rel=3e-6)
 
 
 def test_a_point_is_what_other_code_finds():
@@ -266,17 +220,6 @@ def test_a_switch_closes_when_the_force_on_its_tile_has_risen_to_its_own():
     ((late, pressed),) = cells
     assert late == 0
     assert np.argwhere(pressed).tolist() == [[2, 3]]
-
-
-def test_the_time_of_a_single_switch_is_what_a_hand_finds():
-    """A switch in the last of 8 rows, closed at some clock of a raster scan of 8 rows of 72 clocks: the rest of this
-    scan, 12 clocks of which the last row is released in, 23 in the stages, and the bytes."""
-    cells = np.zeros((8, 8), bool)
-    cells[7, 7] = True
-    for share in (0.1, 0.45, 0.8):
-        clocks, size = speed.first_report(SMALL, [(0, cells)], share)
-        begun = speed.touch_cycle(SMALL, share) % 576
-        assert clocks == 576 - begun - 12 + 23 + size * 10 * 4, share
 
 
 def test_a_touch_takes_mechanics_and_electronics():
@@ -355,17 +298,6 @@ def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
         assert compute.study(tasks, client.get_executor(), with_size=False) == points
 
 
-def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatch):
-    calls = []
-    monkeypatch.setattr(compute, "_scene_errors", lambda *args: calls.append(1) or (errors.Errors(False, 0, 0, 0),) * 3)
-    compute.accuracy(task(), 0)
-    compute.accuracy(task(), 0)
-    assert len(calls) == 20
-    monkeypatch.setattr(kept.sources, "digest", lambda *_, **__: "other code")
-    compute.accuracy(task(), 0)
-    assert len(calls) == 40
-
-
 @pytest.mark.slow
 def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, capsys):
     options = ["--no-size", "--jobs", "1", "--output"]
@@ -398,26 +330,16 @@ def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
 
 
 @pytest.mark.slow
-def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
+def test_the_page_shows_what_its_numbers_say(tmp_path):
     """Pictures and tables of docs/chart.md and README.md come from docs/chart/chart.csv."""
-    monkeypatch.chdir(ROOT)
-    points = numbers.read(tables.NUMBERS)
+    points = numbers.read(ROOT / tables.NUMBERS)
     assert {point.task.method for point in points} == set(METHODS)
     assert {point.task.family for point in points} == set(FAMILIES_DRAWN)
+    assert not outdated("chart", points, "front", "families", "methods")
     for folder in ("chart", "images"):
         (tmp_path / folder).mkdir()
-    drawn = tables.draw(tmp_path / "images", points)
-    for path in drawn:
+    for path in tables.draw(tmp_path / "images", points):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
-    for name in ("front", "families", "methods"):
-        assert section("chart.md", name) == writer.spelled(getattr(tables, f"{name}_table")(points))
-
-
-def test_the_page_shows_as_many_placements_as_it_says():
-    (count,) = {point.task.count for point in numbers.read(ROOT / tables.NUMBERS)}
-    page = " ".join((ROOT / "docs/chart.md").read_text(encoding="utf-8").split())
-    assert f"have {count} scenes per point" in page
-    assert count == tables.PLACEMENTS
 
 
 def test_ways_beside_the_chart_are_found_on_its_families():
@@ -427,17 +349,6 @@ def test_ways_beside_the_chart_are_found_on_its_families():
     task = next(point.task for point in numbers.read(ROOT / tables.NUMBERS) if point.task.family == "bumper")
     assert 0 < beside.least_mm(task).mean < task.skin.pitch_x_mm
     assert beside.least_mm(dataclasses.replace(task, family="fingers")) is None
-
-
-def test_the_picture_of_the_front_rings_what_to_build():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    build = compute.to_build(points)
-    figure = front_picture.picture(points)
-    assert build in figure._suptitle.get_text()
-    for axes, name, factor in zip(figure.axes, ("miscounted", "barycenter_mm"), (100, 1), strict=True):
-        (ring,) = (line for line in axes.lines if line.get_markersize() == 13)
-        (best,) = [one for one in points if (one.task.method, one.task.family) == (build, "fingers")]
-        assert ring.get_xydata().tolist() == [[compute.reached_us(best), factor * picture.error(best, name)]]
 
 
 def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
@@ -459,57 +370,6 @@ def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
             assert ((skin.clock_hz, skin.baud) == fast[1:]) == fast[0]  # as the legend says
 
 
-def test_walls_and_rivals_are_drawn_as_such():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    build = compute.to_build(points)
-    floor = Interval(0.77, 0.7, 0.8, 400)
-    points = [dataclasses.replace(one, least_mm=floor) if one.task.method == build else one for one in points]
-    found = {name: Interval(0.1, 0.05, 0.2, 400) for name in errors.METRICS}
-    rival = beside.RivalMethod("analog array", "fingers", errors.Quantile(7e3, 6e3, 8e3, 200), found)
-    row = FAMILIES_DRAWN.index("fingers")
-    count, place = picture.picture(points, [rival]).axes[2 * row : 2 * row + 2]
-    assert "analog array, model" in {text.get_text() for text in count.texts}
-    bits = beside.bits_us([one for one in points if one.task.family == "fingers"])
-    for panel in (count, place):
-        assert bits in {float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]}
-    assert [float(line.get_ydata()[0]) for line in place.lines if list(line.get_xdata()) == [0, 1]] == [0.77]
-    slow = [one for one in points if one.task.skin.baud == 3_000_000 and one.task.family == "fingers"]
-    assert all(bits <= one.times.lower_bound_us for one in slow)
-
-
-def test_marks_are_hollow_where_many_contacts_are_missed():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    shown = {point.task.method for point in points if point.task.family == "pair" and picture.hollow(point)}
-    missed = {
-        point.task.method
-        for point in points
-        if point.task.family == "pair" and point.errors["total"]["missed"].mean > 0.05
-    }
-    assert shown == missed
-    assert 0 < len(shown) < len(METHODS)
-
-
-def test_zero_has_a_place_of_its_own_on_the_axis_of_shares():
-    panels = picture.picture(numbers.read(ROOT / tables.NUMBERS)).axes
-    for panel in panels[0::2]:
-        zero, least, most = panel.transData.transform([(100, 0), (100, 0.01), (100, 1)])[:, 1]
-        assert panel.bbox.y0 < zero < least - 5 < most < panel.bbox.y1
-        assert "0 %" in [label.get_text() for label in panel.get_yticklabels()]
-
-
-def test_no_point_lies_outside_its_panel():
-    points = numbers.read(ROOT / tables.NUMBERS)[:40]
-    late = dataclasses.replace(points[0].times, touch_median_us=errors.Quantile(3e6, 2e6, 4e6, 200))
-    wrong = {
-        kind: errors | {"barycenter_mm": Interval(170.0, 160.0, 180.0, 9)} for kind, errors in points[0].errors.items()
-    }
-    points.append(dataclasses.replace(points[0], times=late, errors=wrong))
-    for panel in picture.picture(points).axes:
-        for x, y in (place for line in panel.lines if line.get_marker() != "None" for place in line.get_xydata()):
-            assert panel.get_xlim()[0] < x < panel.get_xlim()[1]
-            assert math.isnan(y) or panel.get_ylim()[0] < y < panel.get_ylim()[1]
-
-
 def test_what_is_never_felt_is_drawn_as_never():
     points = [one for one in numbers.read(ROOT / tables.NUMBERS) if one.task.family == "palm"]
     assert any(math.isinf(compute.reached_us(one)) for one in points)
@@ -518,16 +378,6 @@ def test_what_is_never_felt_is_drawn_as_never():
     assert picture.NEVER_US in [line.get_xdata()[0] for line in panel.lines if line.get_marker() in "sv^oD"]
     rows = times_picture.picture(points).axes[0]
     assert [label.get_text() for label in rows.get_yticklabels()] == [one.task.method for one in points]
-
-
-def test_a_labeller_that_nobody_has_drawn_gets_the_color_of_its_cover_and_the_mark_of_its_pitch():
-    points = numbers.read(ROOT / tables.NUMBERS)[:24]
-    toy = Task(
-        "toy, 7 mm, mine", Skin(pitch_x_mm=7.0, labeller="toy_labeller:TOY"), points[0].task.cover, "bumper", 4, 0
-    )
-    points.append(dataclasses.replace(points[0], task=toy))
-    (legend,) = picture.picture(points).legends
-    assert {"other covers", "pitch 7 mm"} <= {text.get_text() for text in legend.get_texts()}
 
 
 @pytest.mark.campaign
@@ -545,10 +395,3 @@ def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
     faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in tables.host_table().splitlines()[2:]}
     # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
     assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
-
-
-def test_all_sheets_have_the_same_extent():
-    assert {skin.pitch_x_mm for skin, _ in METHODS.values()} == set(PITCHES_MM)
-    for skin, _ in METHODS.values():
-        assert skin.rows * skin.pitch_y_mm == skin.columns * skin.pitch_x_mm == EXTENT_MM
-        assert isinstance(skin, Skin)

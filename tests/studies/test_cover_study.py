@@ -1,33 +1,24 @@
-"""The pages on the cover: their tables are those that the code gives, and the rules that fail do."""
+"""The pages on the cover: errors in their tables, rules that hold and rules that fail."""
 
 import math
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from study_pages import outdated, section
+from study_pages import section
 
 from contactfpga.design.cover import Ball, Cap, Cover
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M
 from contactfpga.design.cover.sense import LADDER
-from contactfpga.design.cover.task import FOAMS
 from contactfpga_sim.lab.cover import caps, formulas, tables
 from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
 RUN = StudyRun(STUDIES["cover"])
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
-
 
 def cells(table):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
-
-
-@pytest.mark.parametrize("name", ["paper", "foams", "thinning", "sags"])
-def test_tables_without_times_are_up_to_date(name):
-    assert not outdated("cover", name)
 
 
 @pytest.mark.parametrize("name", ["rules", "failing", "sense"])
@@ -49,17 +40,6 @@ def test_the_largest_errors_against_the_boundary_elements_are_those_that_the_pag
     assert max(rigid for _, side, _, rigid, _ in rows if side == 4) > 20
     error = caps._off(5.0, 8.0, math.inf, proud=False)
     assert f"{100 * error:+.1f} %" == cells(section("paper.md", "elements"))[2 + 6][2]
-
-
-def test_proud_caps_close_lighter_than_flush_faces():
-    """The finding of the page's first part, by its table."""
-    found = {(row[0], row[1].split()[0], row[1].split()[1]): row for row in cells(section("cover.md", "closes"))[2:]}
-    for pitch in ("10 mm", "6.4 mm"):
-        flush, tiles = (float(found[pitch, *name][5].split()[0]) for name in (("flush", "face"), ("tiles:", "the")))
-        assert flush > 3 * tiles
-    assert float(found["6.4 mm", "tiles:", "the"][8].split()[0]) <= 2.0
-    assert f"This model has {found['10 mm', 'flush', 'face'][5]} at worst for a finger" in " ".join(PAGE.split())
-    assert "5 mm | 4 mm | -0.2 % | +24.0 %" in section("paper.md", "elements")
 
 
 def test_a_strip_sags_as_a_clamped_beam_does():
@@ -107,25 +87,6 @@ def test_the_reference_has_no_error_and_the_half_space_has():
     assert half[0] == pytest.approx(0.57, abs=0.01)
     assert abs(half[2]) < 0.01
     assert half[-1] < -0.7
-
-
-def test_every_line_of_the_papers_table_has_a_verdict():
-    rows = tables.rows()
-    assert len(rows) == 20
-    assert all(row.printed and row.ours and row.verdict for row in rows)
-    text = tables.paper_table()
-    for value in (
-        *("64.7785 N", "44.7066 N at 8.6603 mm", "3.6344 mm", "4.0958 mm at 15 N → 5.792 mm", "4.2002 mm", "15.789 N"),
-        *("12.11 or 11.5; 15.79 or 15.00; 8.49 or 8.94", "4.49 m²/s²", "1.471637592", "2.174 mm", "3.29 to 4.08 mm"),
-        *("57.5 kPa", "1.3104π", "0.8255π", "0.7777", "1.9442", "83.7589; 154.285", "97.969", "8.024 mm", "12.16 mm"),
-        *("20 to 74", "0.10496", "0.19518", "1.571", "0.190", "341 N", "15.7 to 18.0 mm", "16.62 N"),
-        *("4.56 mm and 36.8 N", "5.56 mm"),
-    ):
-        assert value in text, value
-
-
-def test_every_foam_is_in_the_page():
-    assert [row[0] for row in cells(section("cover.md", "foams"))[2:]] == [foam.name for foam in FOAMS]
 
 
 def test_a_time_is_measured(monkeypatch):

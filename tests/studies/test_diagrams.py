@@ -1,4 +1,4 @@
-"""The diagrams: they are the ones that are drawn, and show what commands and pages say elsewhere."""
+"""The diagrams show what commands and pages say elsewhere."""
 
 import contextlib
 import io
@@ -6,25 +6,17 @@ import json
 import re
 from pathlib import Path
 
-import matplotlib
 import pytest
 import svg_texts
 from study_pages import section
 
-from contactfpga import picture_style
 from contactfpga.design import kits
 from contactfpga.tools import cli
-from contactfpga_sim.lab.diagrams import cutaway, packet, pictures, together, wires
+from contactfpga_sim.lab.diagrams import cutaway
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TIMES = section("kits.md", "times")
 KIT = kits.kit("starter")
-DRAWN = {
-    "together": lambda path: together.draw(KIT, path),
-    "cutaway": lambda path: cutaway.draw(KIT, path),
-    "wiring": lambda path: wires.draw(KIT, path),
-    "packet": lambda path: packet.draw(KIT.skin, path),
-}
 
 
 def words(name):
@@ -33,20 +25,6 @@ def words(name):
 
 def middle(one):
     return one.corners.mean(axis=0)
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_a_diagram_is_the_one_that_is_drawn(name, tmp_path):
-    with matplotlib.rc_context(picture_style.SETTINGS):
-        drawn = DRAWN[name](tmp_path / f"{name}.svg")
-    assert drawn.read_bytes() == (DOCS / "images" / drawn.name).read_bytes()
-
-
-@pytest.mark.slow
-def test_all_are_drawn(tmp_path):
-    drawn = pictures.draw(tmp_path)
-    assert {path.stem for path in drawn} == {*DRAWN, "touch"}
-    assert all(path.read_bytes() == (DOCS / "images" / path.name).read_bytes() for path in drawn)
 
 
 @pytest.mark.parametrize("port", ["contact", "last byte on the wire", "host's USB controller", "decision"])

@@ -5,7 +5,6 @@ import dataclasses
 import functools
 import math
 import re
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from sample import sample
 from scipy import ndimage
 from scipy.stats import fisher_exact
 from study_pages import outdated, section
-from zone_oracles import zones_by_image_tools
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
@@ -70,13 +68,9 @@ NOT_NOTICED = {
 
 QUICK = [
     ("winding", "`run`"),
-    ("closing", "8-connectivity, 10 mm"),
-    ("bounce", "`none`"),
-    ("settle", "4.7 kΩ pull-up, `release_us = 1`"),
     ("diodes", "three fingers at corners"),
     ("ghosts", "zones"),
     ("broken", "row"),
-    ("stuck", "no mask"),
 ]
 """What `make test-all` turns: some seconds each, with few boards beside the reference Skin's."""
 
@@ -110,7 +104,7 @@ def test_it_breaks_where_the_page_says(turn, name, method):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "method"), sample(METHODS, QUICK[1:2]), ids=map(" ".join, METHODS))
+@pytest.mark.parametrize(("name", "method"), sample(METHODS, QUICK[2:3]), ids=map(" ".join, METHODS))
 def test_two_other_seeds_break_there_or_a_step_beside(turn, name, method):
     knob, first = KNOBS[name], turn(name, method).broken
     assert knob.runs[method].seed == 0
@@ -152,18 +146,10 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
 
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
-    assert not outdated("failures", computed=turned)
+    assert not outdated("failures", turned)
     for name in KNOBS.keys() - tables.SAID.keys():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(KNOBS[name], turned[name]) == drawn
-
-
-def test_the_page_shows_each_knob_by_a_picture_or_a_sentence():
-    files = {path.stem for path in (PAGE.parent / "images" / "failures").iterdir()}
-    shown = re.findall(r"images/failures/(\w+)\.svg", PAGE.read_text(encoding="utf-8"))
-    assert sorted(shown) == sorted(files)
-    assert files == KNOBS.keys() - tables.SAID.keys()
-    assert tables.SAID.keys() <= KNOBS.keys()
 
 
 # ---- the same by other ways
@@ -179,26 +165,15 @@ def test_the_arm_winds_without_touching_itself_or_the_finger():
         assert ndimage.label(cells, np.ones((3, 3)))[1] == 2
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("method", ["projection", "single"])
-@pytest.mark.parametrize("name", ["winding", "crossing"])
-def test_zones_by_shadows_are_those_of_image_tools(turn, name, method):
-    for outcome in turn(name, f"`{method}`").outcomes:
-        assert len(outcome.zones) == len(zones_by_image_tools(outcome.cells, method))
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["winding", "crossing"])
+@pytest.mark.parametrize("name", sample(["winding", "crossing"], quick=["winding"]))
 def test_zones_are_those_of_image_tools(turn, name):
     for outcome in turn(name, "`run`").outcomes:
         assert len(outcome.zones) == ndimage.label(outcome.cells, np.ones((3, 3)))[1]
 
 
-PAIRS = sample([(8, 10), (4, 10), (8, 5), (4, 5)], quick=[(8, 10)])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("connectivity", "pitch"), PAIRS)
+@pytest.mark.campaign
+@pytest.mark.parametrize(("connectivity", "pitch"), [(8, 10), (4, 10), (8, 5), (4, 5)])
 def test_fingers_that_close_in_are_counted_as_often_as_geometry_and_image_tools_say(turn, connectivity, pitch, rng):
     """Rates of other pairs, which share no code with the scenes."""
     structure = np.ones((3, 3)) if connectivity == 8 else None
@@ -223,7 +198,7 @@ def two_discs(gap, pitch, structure, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("diameter", [8, 16, 24])
+@pytest.mark.parametrize("diameter", sample([8, 16, 24], quick=[24]))
 def test_no_finger_is_felt_whose_pressure_closes_no_switch_and_each_that_closes_one(turn, diameter):
     """A tile takes at most its own share of a flat finger's area. A dome of 0.4 N differs by 10 % from the next."""
     found = turn("light", f"flat, {diameter} mm")
@@ -235,7 +210,7 @@ def test_no_finger_is_felt_whose_pressure_closes_no_switch_and_each_that_closes_
     assert found.holds_until <= 1.4 * max(least, 4 * 0.4)  # the others at least on a quarter of one
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("force", [2, 5, 10])
 def test_fingers_on_the_kit_are_told_apart_as_image_tools_count_them(turn, force):
     for outcome in turn("closing", f"starter kit, {force} N each").outcomes:
@@ -345,24 +320,6 @@ def test_a_host_may_pause_until_the_systems_buffer_is_full(turn):
 
 
 @pytest.mark.campaign
-def test_lost_is_right_up_to_a_multiple_of_256_before_the_next_hello(turn):
-    for outcome in turn("host", "every frame of `contactfpga.open()`").outcomes:
-        missing, told = map(int, re.findall(r"-?\d+", outcome.what))
-        assert (missing - told) % 256 == 0
-
-
-@pytest.mark.campaign
-def test_three_corners_make_four_zones_all_of_them_suspect(turn):
-    found = turn("ghost", "zones").outcomes
-    assert [(len(outcome.zones), outcome.told) for outcome in found] == [
-        (1, ()),
-        (2, ("ghost",)),
-        (4, ("ghost",)),
-        (4, ("ghost",)),
-    ]
-
-
-@pytest.mark.campaign
 def test_moving_fingers_are_off_by_what_they_move_until_their_row_is_read():
     """A zone is off by at most one scan's motion and what a disc of this size is off at rest."""
     for method in touch.MOVING.runs.values():
@@ -453,106 +410,12 @@ def test_lines_of_the_table(verdicts, expected):
     assert line.split(" | ")[1:-1] == ["method", *expected]
 
 
-SPACE = "{http://www.w3.org/2000/svg}"
-
-
-def parts(picture):
-    """Kinds of the bars, what is written, and the heights of each chart's steps in pixels above none."""
-    root = ElementTree.fromstring(picture)
-    bars = [bar.get("class") for bar in root.iter(f"{SPACE}rect") if bar.get("class")]
-    words = [(float(text.get("x")), text.text) for text in root.iter(f"{SPACE}text")]
-    areas = [path.get("d") for path in root.iter(f"{SPACE}path") if path.get("class") == "shares"]
-    heights = []
-    for area in areas:
-        *steps, bottom = map(int, re.findall(r"(?:^M[\d.]+ |V)(\d+)", area))
-        heights.append([bottom - step for step in steps])
-    return bars, words, heights
-
-
-def shares(*amounts):
-    """Of draws that are right; what is below 95 % is not noticed."""
-    return Sweep(
-        tuple(range(len(amounts))), tuple(Outcome(amount >= 0.95, what="x", amount=amount) for amount in amounts)
-    )
-
-
-def test_a_picture_shows_every_value_and_says_what_bars_mean():
-    knob = Knob("x", "X", "gap, mm", "share", tuple(range(8)), {}, "it helps")
-    steep, flat = shares(1, 1, 1, 1, 0, 0, 0, 0), shares(1, 1, 1, 1, 1, 1, 0.75, 0.5)
-    bars, words, heights = parts(knob_pictures.svg(knob, {"steep": steep, "flat": flat}))
-    assert bars == 4 * ["right"] + 4 * ["silent"] + 6 * ["right"] + 2 * ["silent"]
-    assert heights == [4 * [44] + 4 * [0], 6 * [44] + [33, 22]]
-    said = [word for _, word in words]
-    assert said.count("right") == said.count("wrong, not noticed") == 2
-    assert {"steep", "flat", "gap, mm", "0", "7"} <= set(said)
-    assert all(left < knob_pictures.LEFT for left, word in words if word in ("steep", "flat"))
-
-
-def test_methods_of_which_the_same_comes_out_share_a_chart():
-    knob = Knob("x", "X", "gap, mm", "share", (0, 1, 2), {}, "it helps")
-    one, other = shares(1, 0.5, 0), shares(1, 0.5, 0.25)
-    bars, words, heights = parts(knob_pictures.svg(knob, {"a": one, "b": other, "c": one}))
-    assert len(bars) == 6
-    assert heights == [[44, 22, 0], [44, 22, 11]]
-    assert [word for _, word in words if word[0] in "abc" and len(word) < 5 and word != "all"] == ["a; c", "b"]
-
-
-def test_sheets_stand_beside_the_charts_with_the_unit_of_their_value():
-    knob = Knob("x", "X", "gap, mm", "share", (0, 1), {}, "it helps")
-    cells = np.eye(4, dtype=bool)
-    before, after = (Outcome(right, (), "", float(right), cells, ((1.0, 2.0),)) for right in (True, False))
-    _, words, _ = parts(knob_pictures.svg(knob, {"a": Sweep((0, 1), (before, after))}))
-    assert [word for _, word in words if word.startswith("at ")] == ["at 0 mm", "at 1 mm"]
-
-
-@pytest.mark.campaign
-def test_the_pictures_of_the_page_show_every_value(turn):
-    for name in ("baud", "diodes", "broken"):
-        methods = {method: turn(name, method) for method in KNOBS[name].runs}
-        drawn = [[knob_pictures._kind(outcome) for outcome in found.outcomes] for found in methods.values()]
-        bars, _, heights = parts(knob_pictures.svg(KNOBS[name], methods))
-        of = len(KNOBS[name].values)
-        assert {tuple(bars[at : at + of]) for at in range(0, len(bars), of)} == set(map(tuple, drawn))
-        assert all(len(steps) == len(KNOBS[name].values) for steps in heights)
-
-
-@pytest.mark.parametrize("name", KNOBS)
-def test_values_lie_true_to_scale(name):
-    values = KNOBS[name].values
-    spans, scale = knob_pictures.placed(values, 50.0, 400.0)
-    assert (spans[0].start, spans[-1].end) == (50.0, pytest.approx(450.0))
-    first = 1 if "0 stands apart" in scale else 0
-    there = np.log10(values[first:]) if scale else np.array(values, float)
-    unit = (spans[-1].middle - spans[first].middle) / (there[-1] - there[0])
-    for place, span in zip(there, spans[first:], strict=True):
-        assert span.middle == pytest.approx(spans[first].middle + unit * (place - there[0]))
-        assert span.start < span.middle < span.end
-
-
-def test_zero_and_what_is_unevenly_spaced_are_said():
-    assert knob_pictures.placed((0, 1, 2, 3), 0, 100)[1] == ""
-    assert knob_pictures.placed((3, 2, 1, 0), 0, 100)[1] == ""
-    assert knob_pictures.placed((1, 2, 4, 8), 0, 100)[1] == " (logarithmic)"
-    assert knob_pictures.placed((0, 1, 10, 100), 0, 100)[1] == " (logarithmic; 0 stands apart)"
-
-
 @pytest.mark.slow
 def test_the_command_writes_a_study(tmp_path, capsys):
-    assert cli.main(["study", "failures", "--study", "diodes", "--output", str(tmp_path)]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["diodes.svg", "failures.md"]
-    assert (tmp_path / "diodes.svg").read_text() == (PAGE.parent / "images" / "failures" / "diodes.svg").read_text()
+    assert cli.main(["study", "failures", "--study", "ghost", "--output", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["failures.md", "ghost.svg"]
+    assert (tmp_path / "ghost.svg").read_text() == (PAGE.parent / "images" / "failures" / "ghost.svg").read_text()
     lines = (tmp_path / "failures.md").read_text().splitlines()[2:]
     assert lines
     shown = [line for name in ("failures", "unnoticed") for line in section("failures.md", name).splitlines()]
     assert all(line in shown for line in lines if line)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--study", "elbow"], "--study 'elbow' is not known; take one of: winding; crossing"),
-    ],
-)
-def test_what_the_command_does_not_take(arguments, message, capsys):
-    assert cli.main(["study", "failures", *arguments]) == 1
-    assert message in capsys.readouterr().err

@@ -1,10 +1,7 @@
-"""Electrical faults: what the guard lines of the compiled gateware tell, and how fast; the tables of docs/safety.md."""
-
-from pathlib import Path
+"""Electrical faults: what the guard lines of the compiled gateware tell, and how fast."""
 
 import numpy as np
 import pytest
-from study_pages import outdated, section
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
@@ -16,7 +13,6 @@ from contactfpga_sim.model.sheet import wiring
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
 
 LIMIT_US = 2 * GUARDED.derived.frame_clocks // GUARDED.derived.clocks_per_us + 1000
 """Two frames and a millisecond: what guard lines promise."""
@@ -89,14 +85,6 @@ def test_two_pins_that_fight_are_told_where_the_column_reads_released():
 # ---- the catalogue
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_each_fault_has_places_that_differ(fault):
-    hurts = FAULTS[fault].places(GUARDED)
-    assert hurts
-    assert all(hurt != SheetFault() for hurt in hurts.values())
-    assert len({repr(hurt) for hurt in hurts.values()}) == len(hurts)
-
-
 def test_every_line_is_cut_at_both_ends():
     for fault, lines, ends in (("broken row", 16, "column"), ("broken column", 16, "row")):
         names = set(FAULTS[fault].places(Skin()))
@@ -143,22 +131,6 @@ def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
     lines = tables.coverage_table().splitlines()[2:]
     listed, places = len(FAULTS), len(FAULTS) + 2
     assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
-
-
-def test_the_page_lists_every_fault_and_every_option():
-    table = section("safety.md", "faults")
-    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == [
-        fault.title for fault in FAULTS.values()
-    ]
-    table = section("safety.md", "coverage")
-    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == list(tables.OPTIONS)
-    assert not outdated("safety", "times")
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(3600)
-def test_the_page_is_up_to_date():
-    assert not outdated("safety")
 
 
 @pytest.mark.campaign

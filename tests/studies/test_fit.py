@@ -32,13 +32,6 @@ def test_one_contact_needs_single_and_a_second_one_an_exact_labeller(file, short
 
 
 @pytest.mark.slow
-def test_hands_need_an_exact_labeller(file, shortcuts):
-    found = chosen(file(HANDS), barycenter_mm=4.0)
-    assert found.answer.skin.labeller == "serial"
-    assert found.answer.measured[0].errors["miscounted"].mean == 0
-
-
-@pytest.mark.slow
 def test_neither_names_nor_orders_make_a_difference(file, shortcuts):
     texts = [BUMPER, HANDS]
     names = [("bumper.toml", "hands.toml"), ("x.toml", "0.toml")]
@@ -49,14 +42,6 @@ def test_neither_names_nor_orders_make_a_difference(file, shortcuts):
         costs = [trial.cost for trial in (found.answer, found.runner_up, *found.cheaper)]
         answers.add((found.answer.skin, found.runner_up.skin, *(one.skin for one in found.cheaper), *costs))
     assert len(answers) == 1
-
-
-@pytest.mark.slow
-def test_what_is_called_hands_is_no_hand(file, shortcuts):
-    bumper, renamed = (chosen(file(BUMPER, name)) for name in ("bumper.toml", "hands.toml"))
-    assert renamed.answer == bumper.answer
-    swapped = chosen(file(HANDS, "bumper.toml"))
-    assert swapped.answer.skin.labeller == "serial"
 
 
 @pytest.mark.slow

@@ -1,33 +1,25 @@
-"""The command `contactfpga fit`, and its page."""
+"""The command `contactfpga fit`, and what its page quotes."""
 
-import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from amaranth.back import rtlil
-from fits import APART, BUMPER, HANDS, SECOND, chosen
+from fits import BUMPER, HANDS, chosen
 from recorded_frames import path_of
-from study_pages import outdated, section
+from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_hdl.board import sizes
-from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size
-from contactfpga_sim.lab.fit import cost, search, tables
-from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import FitTask, Goals
+from contactfpga_sim.lab.fit import search
 from contactfpga_sim.lab.studies import STUDIES
 
 pytestmark = pytest.mark.usefixtures("alone")
 
 UNSOLVED = 3
 ROOT = Path(__file__).resolve().parents[2]
-
-
-# ---- the command
 
 
 @pytest.mark.slow
@@ -50,16 +42,6 @@ def test_the_command_writes_a_skin_that_loads_and_builds(file, tmp_path, capsys,
     assert "# 423 LUT4 on iCE40UP5K, 8 wires" in output.read_text()
     assert len(built) == 1
     assert "top" in built[0]
-
-
-@pytest.mark.campaign
-def test_the_luts_are_those_of_place_and_route():
-    skin = Skin(rows=4, columns=4, labeller="single")
-    found = sizes.luts(lambda: Top(skin), sizes.UP5K)
-    assert 300 < found < 700
-    assert (
-        found == sizes.measure(lambda: Top(skin), sizes.UP5K, seeds=1).luts == size.luts(lambda: Top(skin), cost.DEVICE)
-    )
 
 
 @pytest.mark.slow
@@ -130,53 +112,8 @@ def test_the_page_shows_what_the_examples_say(name):
 
 
 @pytest.mark.slow
-def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
-    path = file(HANDS)
-    section = tables.section(f"{path} --cover bare --pitch-mm 10 --scan raster")
-    lines = section.splitlines()
-    assert lines[0] == f"    contactfpga fit {path} --cover bare --pitch-mm 10 --scan raster"
-    assert lines[2:4] == [
-        "| zones by | scan | sheet | pitch mm | LUT4 | wires | bytes | latency us | verdict |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    verdicts = [line.split(" | ")[-1].removesuffix(" |") for line in lines[4:] if line.count(" | ") == 8]
-    assert verdicts[-2:] == ["the answer", "runner-up"]
-    assert verdicts[1].startswith("miscounts 100 % of scenes")
-    assert section.endswith("cheaper ones are refused; 4 others cost more. Skin itself refuses 0 more settings.")
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(7200)
-@pytest.mark.parametrize("name", STUDIES["fit"].sections)
-def test_the_page_is_up_to_date(name, monkeypatch):
-    monkeypatch.undo()  # what was synthesized before is kept
-    assert not outdated("fit", name)
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(3600)
-def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypatch):
-    """With real sizes and times."""
-    monkeypatch.undo()  # what was synthesized before is kept
-    text = (ROOT / "examples" / "scenes-bumper.toml").read_text()
-    limits = {"barycenter_mm": 3.0, "latency_us": 500.0, "pitches": (10.0,), "quick": True}
-    one, two = chosen(file(text), **limits), chosen(file(APART + text + SECOND), **limits)
-    assert one.answer.skin == Skin(labeller="single")
-    assert two.answer.skin == Skin(labeller="serial")
-    assert (one.broken, two.broken) == ((), ())
-
-
-@pytest.mark.slow
 @pytest.mark.recordings
 def test_real_contacts_need_an_exact_labeller(shortcuts):
     found = chosen(str(path_of("dtmf16x16")), pitches=None, latency_us=None)
     assert found.answer.skin.labeller == "serial"
     assert found.answer.skin.connectivity == 8
-
-
-def test_dataclasses_of_a_task_can_be_sent_to_another_process(file):
-    import pickle
-
-    task = FitTask((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
-    assert pickle.loads(pickle.dumps(task)) == task
-    assert dataclasses.replace(task, count=11) != task

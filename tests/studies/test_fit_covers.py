@@ -11,7 +11,7 @@ from scipy.stats import binom
 from contactfpga.design.cover import Cells, Ellipse, Load, load_cover
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab.covers import COVERS, tiled
+from contactfpga_sim.lab.covers import tiled
 from contactfpga_sim.lab.fit import faces, racing, search
 from contactfpga_sim.lab.fit.candidates import candidates
 from contactfpga_sim.lab.fit.sources import source
@@ -136,11 +136,3 @@ def test_the_answers_file_has_the_cover_that_was_chosen(file, tmp_path, shortcut
     own = [one for one in options if one not in ("--dome-n", "0.25")]
     assert cli.main(["fit", file(text), *own, "--skin", str(output), "--output", str(again)]) == 0
     assert load_cover(again) == cover
-
-
-def test_every_pitch_has_a_whole_number_of_columns_and_covers_that_fit():
-    made = faces.faces()
-    assert len(made) == 10
-    for cover in made.values():
-        assert faces.refusal(cover(7.0), (7.0, 7.0)) == ""
-    assert "a cap is 0.0094 m wide" in faces.refusal(COVERS["tiles"](10.0), (8.0, 8.0))

@@ -1,7 +1,6 @@
 """The limits of a fit, what a Skin costs, and which ones are tried."""
 
 import itertools
-import math
 
 import pytest
 from fits import BUMPER, HANDS, chosen
@@ -9,9 +8,9 @@ from scipy.stats import binomtest
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.chart import speed
-from contactfpga_sim.lab.chart.errors import Interval, interval
+from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.fit import cost, search
+from contactfpga_sim.lab.fit import search
 from contactfpga_sim.lab.fit.candidates import METHODS, candidates, pitches_for, size_for
 from contactfpga_sim.lab.fit.sources import source
 from contactfpga_sim.lab.fit.trial import Goals, Measurement
@@ -82,19 +81,6 @@ def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_mean():
     assert goals.excess(measured()) == 1
 
 
-def test_what_was_never_found_meets_no_limit():
-    nothing = Interval(math.nan, math.nan, math.nan, 0)
-    assert list(Goals().misses(measured(barycenter_mm=nothing))) == [(math.inf, "finds no contact")]
-    assert list(Goals(barycenter_mm=None).misses(measured(barycenter_mm=nothing))) == []
-
-
-def test_a_single_value_tells_nothing_of_the_mean():
-    one = interval([2.5])
-    assert (one.mean, one.low, one.high, one.count) == (2.5, -math.inf, math.inf, 1)
-    words = [words for _, words in Goals().misses(measured(barycenter_mm=one))]
-    assert words == ["barycenter off by 2.5 mm (0 to inf), limit 5 mm: too few scenes to tell"]
-
-
 @pytest.mark.slow
 def test_a_share_that_so_few_scenes_cannot_show_is_refused():
     for limit in (0.5, 0.05, 0.003):
@@ -118,27 +104,6 @@ def test_no_sheet_with_more_wires_than_the_answer_is_synthesized(file, shortcuts
     fewer = {one.skin for one in possible if one.skin.rows + one.skin.columns < found.answer.wires}
     assert fewer == {one.skin for one in found.cheaper if one.wires < found.answer.wires}
     assert found.dearer == len(possible) - len(found.cheaper) - 1
-
-
-@pytest.mark.slow
-def test_quick_synthesizes_no_refused_ones(file, shortcuts):
-    path = file(HANDS)
-    slow = chosen(path)
-    every = len(shortcuts.sized)
-    shortcuts.sized.clear()
-    quick = chosen(path, quick=True)
-    assert (quick.answer, quick.runner_up) == (slow.answer, slow.runner_up)
-    assert [one.skin for one in quick.cheaper] == [one.skin for one in slow.cheaper if one.wires < slow.answer.wires]
-    assert len(shortcuts.sized) < every
-    assert {skin.labeller for skin in shortcuts.sized} == {"serial", "run"}
-
-
-def test_wires_then_bytes_decide_between_equal_luts(file, shortcuts, monkeypatch):
-    monkeypatch.setattr(cost, "luts_of", lambda skin: 500)
-    found = chosen(file(BUMPER), pitches=(10.0, 20.0), barycenter_mm=None, host_us=0.0)
-    assert found.answer.wires == 8
-    assert found.answer.bytes == min(one.bytes for one in (found.answer, found.runner_up))
-    assert found.answer.cost <= found.runner_up.cost
 
 
 # ---- what is tried
@@ -165,19 +130,6 @@ def test_a_skin_that_cannot_be_is_listed_with_its_reason(file, shortcuts):
     assert all(one.refusals[0].startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in
                found.impossible if dict(one.candidate.settings)["rows"] == 80)  # fmt: skip
     assert len([one for one in found.impossible if dict(one.candidate.settings)["rows"] == 80]) == 14
-
-
-@pytest.mark.parametrize("pitch", [5.0, 10.0, 20.0])
-def test_a_built_in_scene_is_the_same_on_every_pitch(pitch):
-    base, lines = Skin(), round(160 / pitch)
-    skin = Skin(rows=lines, columns=lines, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=20.0)
-    for number in range(5):
-        reference, seconds = source("two_fingers").at(base, base, number)
-        scene, same = source("two_fingers").at(skin, base, number)
-        assert seconds == same
-        for one, other in zip(reference.truth(seconds).contacts, scene.truth(seconds).contacts, strict=True):
-            assert one.x_mm + 5 == pytest.approx(other.x_mm + pitch / 2)
-            assert one.y_mm + 5 == pytest.approx(other.y_mm + pitch / 2)
 
 
 def test_sheets_that_differ_are_refused(file):

@@ -1,9 +1,7 @@
 """Flips of single bits: every bit is there, each is followed, and what came of it is judged rightly."""
 
 import json
-import queue
 import types
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +9,6 @@ import pytest
 from study_pages import outdated
 
 from contactfpga import Skin
-from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables, touches
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.flip import Flip, FlipOutcome
@@ -119,14 +115,6 @@ def test_a_scan_that_waits_and_hears_of_no_touch_is_stale(fast):
     from_rest = next(index for index, one in enumerate(heard) if index and one.said[0] and not heard[index - 1].said[0])
     del heard[from_rest : from_rest + 2]
     assert "stale" in {kind for _, kind in flip._wrong(fast, heard)}
-
-
-@pytest.mark.slow
-def test_the_reference_is_right_all_the_time(plain):
-    heard = [one for step in plain.steps[4:] for one in step.heard]
-    assert len(heard) > 100
-    assert flip._wrong(plain, heard) == []
-    assert not any(one.flagged for one in heard)
 
 
 @pytest.mark.campaign  # which has a board of its own to compile
@@ -238,11 +226,6 @@ def test_a_change_that_does_not_come_is_wrong_where_frames_come_on_change_only()
     assert flip._wrong(fake(), late) == []
 
 
-@pytest.mark.parametrize(("hits", "of", "low", "high"), [(0, 100, 0.0, 0.0370), (10, 100, 0.0552, 0.1744)])
-def test_wilsons_interval_is_the_one_of_the_tables(hits, of, low, high):
-    assert campaign.wilson(hits, of) == pytest.approx((low, high), abs=1e-4)
-
-
 def test_names_are_those_of_the_gateware():
     model = "\twire<3> p_a_2e_b__c_24_7;\n\tmemory<8> memory_p_a_2e_m { 5u };\n\tmemory<8> memory_i_rom { 2u };\n"
     used = model + "memory_p_a_2e_m.update("
@@ -266,70 +249,14 @@ def test_numbers_are_read_back_as_they_were_written(tmp_path):
     assert summary.wrong_ms(rows) == (250.0, 250.0)
 
 
-def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_missing(monkeypatch):
-    monkeypatch.setattr(campaign.kept, "made_by", lambda module, skin: f"{skin.send} {skin.dual}")
-    masked = ["link.store", False, "masked", "", 0, 0.0, 0.5]
-    for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
-        kept.kept("flips", campaign._key("run", memory, block), lambda: [masked, masked])
-    try:
-        rows = campaign.finished(["run, dual", "run"])
-        assert rows == 6 * [Row("run", FlipOutcome(*masked))]
-    finally:
-        for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
-            kept._path("flips", campaign._key("run", memory, block)).unlink()
-
-
-@pytest.mark.parametrize("within_s", [None, 0.3])
-def test_what_is_not_begun_in_time_is_left_out_and_the_first_block_of_each_never(monkeypatch, within_s):
-    """One worker, ten blocks of registers and five of memory for each of two designs; the time is over in the tenth."""
-    begun, timers = [], queue.Queue()
-
-    class Timer:
-        def __init__(self, seconds, over):
-            self._over = over
-
-        def start(self):
-            timers.put(self._over)
-
-        def cancel(self):
-            pass
-
-    def block(design, memory, number):
-        begun.append((design, memory, number))
-        if within_s and len(begun) == 10:
-            timers.get(timeout=60)()
-        return [FlipOutcome(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
-
-    monkeypatch.setattr(campaign, "_block", block)
-    monkeypatch.setattr(campaign, "threading", types.SimpleNamespace(Timer=Timer))
-    counted = []
-    with ThreadPoolExecutor(1) as executor:
-        rows = campaign.run(["a", "b"], 250, 125, executor, counted.append, within_s)
-    firsts = [(name, memory, 0) for name in "ab" for memory in (False, True)]
-    assert sorted(begun[:4]) == sorted(firsts)
-    assert len(begun) == (10 if within_s else 30)
-    assert counted == [30] * len(begun)
-    found = {(row.design, row.found.memory, int(row.found.name.split()[1])) for row in rows}
-    assert len(rows) == campaign.BLOCK * len(found)
-    for name, memory, _ in firsts:
-        numbers = [number for one, of, number in begun if (one, of) == (name, memory)]
-        taken = [number for one, of, number in found if (one, of) == (name, memory)]
-        assert sorted(taken) == sorted(numbers) == list(range(len(numbers)))
-
-
 def test_a_block_after_one_that_is_missing_does_not_count():
     assert list(campaign._first([[1], [2, 3], None, [4]])) == [1, 2, 3]
-
-
-def test_bad_choices_are_refused_in_a_sentence(capsys):
-    assert cli.main(["study", "flips", "--design", "triple"]) == 1
-    assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
 
 
 def test_the_page_says_what_the_numbers_beside_it_say():
     rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
     assert [design.name for design in sizes] == list(DESIGNS)
-    assert not outdated("flips", computed=tables.FlipResults(rows, sizes))
+    assert not outdated("flips", tables.FlipResults(rows, sizes))
 
 
 def test_tables_count_what_came_out():
@@ -373,16 +300,6 @@ def test_a_flip_that_drives_pins_against_each_other_is_followed_and_counted():
         fights = [one.fights for one in found]
         assert 0 < max(fights) < 100
         assert 0 in fights
-
-
-@pytest.mark.campaign
-def test_a_raster_scan_finds_its_row_again(plain):
-    for name in ("scan.pattern", "scan.row", "scan.is_last", "scan.done_is_row"):
-        place = place_of(plain.board, name)
-        for bit in range(plain.board.places[place].width):
-            for clock in (3, 1003, 5501):
-                found = flip.follow(plain, Flip(Bit(place, 0, bit), plain.step_clocks * 24 + clock))
-                assert found.frames <= 2, (name, bit, clock, found)
 
 
 @pytest.mark.campaign

@@ -10,7 +10,7 @@ from contactfpga.skin import Skin
 from contactfpga.zones import labels
 from contactfpga.zones.zone import Zone
 from contactfpga_sim.lab.chart import errors
-from contactfpga_sim.lab.chart.floor import floor, geometric_medians, inner, place_table, seen
+from contactfpga_sim.lab.chart.floor import floor, inner, place_table
 from contactfpga_sim.lab.covers import tiled
 
 TEN = Skin(pitch_x_mm=10.0, pitch_y_mm=10.0)
@@ -62,31 +62,6 @@ def test_the_floor_of_a_disc_of_known_size_is_that_of_an_integral(radius):
         assert got.lower_mm.mean <= got.upper_mm.mean < 1.01 * got.lower_mm.mean
         away.append((got.upper_mm.mean - want) / sigma(got.upper_mm))
     assert abs(sum(away)) < 3 * math.sqrt(len(away))
-
-
-def test_pitches_that_differ_are_mirrored_and_not_turned():
-    skin = Skin(pitch_x_mm=10.0, pitch_y_mm=5.0)
-    sheet, scenes = inner("finger", skin, 300, 3)
-    felt = [(scene, cells) for scene in scenes if (cells := scene.pressed(0.0, sheet)).any()]
-    assert seen(felt, sheet).offsets.shape == (len(felt), 4, 2)
-    got = floor("finger", skin, None, 300, 3)
-    assert got.lower_mm.mean <= got.upper_mm.mean <= 1.01 * got.barycenter_mm.mean
-
-
-def test_two_seeds_agree_and_the_brackets_hold_each_other():
-    cover = tiled(10.0)
-    first, second = (floor("finger", TEN, cover, 800, seed) for seed in (4, 5))
-    for one, other in ((first, second), (second, first)):
-        apart = 3 * math.hypot(sigma(one.upper_mm), sigma(other.lower_mm))
-        assert abs(one.upper_mm.mean - other.upper_mm.mean) < apart
-        assert one.lower_mm.mean < other.upper_mm.mean + apart
-    assert first != second
-
-
-def test_fewer_scenes_widen_the_bracket_of_a_bumper():
-    few, many = (floor("bumper", TEN, None, count, 6) for count in (200, 1500))
-    assert few.lower_mm.mean < many.lower_mm.mean < many.upper_mm.mean < few.barycenter_mm.mean * 1.05
-    assert many.upper_mm.mean - many.lower_mm.mean < few.upper_mm.mean - few.lower_mm.mean
 
 
 @pytest.mark.parametrize("pitch", [6.4, 10.0])
@@ -147,27 +122,12 @@ def test_a_table_of_other_scenes_reaches_the_floor_where_the_size_is_known():
     assert np.mean(by_barycenter) == pytest.approx(least.barycenter_mm.mean)
 
 
-def test_geometric_medians_are_those_of_an_optimizer():
-    rng = np.random.default_rng(10)
-    places, numbers = rng.normal(size=(60, 2)) * [1, 5], np.repeat([0, 2, 3], 20)
-    got = geometric_medians(places, numbers, 4)
-    for number in (0, 2, 3):
-        some = places[numbers == number]
-        least = minimize(lambda at, some=some: np.hypot(*(some - at).T).sum(), some.mean(axis=0))
-        assert np.hypot(*(some - got[number]).T).sum() == pytest.approx(least.fun, rel=1e-4)
-    assert (got[1] == 0).all()
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: floor("pair", TEN, None, 5, 0), "family 'pair' has no floor here; take one of finger, bumper"),
         (
             lambda: floor("finger", Skin(pitch_x_mm=60.0, pitch_y_mm=60.0), None, 1, 0, half_mm=(0.1, 0.1)),
-            "none of the 1 scenes closes a switch",
-        ),
-        (
-            lambda: place_table("finger", Skin(pitch_x_mm=60.0, pitch_y_mm=60.0), None, 1, 0, half_mm=(0.1, 0.1)),
             "none of the 1 scenes closes a switch",
         ),
     ],

@@ -2,21 +2,18 @@
 
 import dataclasses
 import functools
-from pathlib import Path
 
 import numpy as np
 import pytest
+from sample import sample
 from study_pages import section
 
 from contactfpga.robot.haptics import Contact, Plane, Touch
-from contactfpga_sim.lab.failures import rated
 from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.failures.tables import rows
 from contactfpga_sim.lab.haptics import breaks, felt, pairs, tables
 from contactfpga_sim.lab.haptics.breaks import KNOBS
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics_limits.md").read_text(encoding="utf-8")
-SLOW = ("shape", "skew", "edge")
 ALL = [(name, method) for name, knob in KNOBS.items() for method in knob.runs]
 QUICK = [
     ("unseen", "force at the zone"),
@@ -43,9 +40,7 @@ def swept(name, method, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "method"), [pytest.param(*one, marks=[] if one in QUICK else pytest.mark.campaign) for one in ALL]
-)
+@pytest.mark.parametrize(("name", "method"), sample(ALL, QUICK))
 def test_each_break_is_where_the_page_says(name, method):
     knob = KNOBS[name]
     line = rows(knob, {method: swept(name, method, 0)})[0].split(" | ")[2:7]
@@ -54,9 +49,7 @@ def test_each_break_is_where_the_page_says(name, method):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "method"), [pytest.param(*one, marks=[] if one in QUICK else pytest.mark.campaign) for one in ALL]
-)
+@pytest.mark.parametrize(("name", "method"), sample(ALL, QUICK[:1]))
 def test_two_other_seeds_break_there_or_a_step_beside(name, method):
     broken = [swept(name, method, seed).broken for seed in (0, 1, 2)]
     places = [len(KNOBS[name].values) if place is None else place for place in broken]
@@ -67,24 +60,6 @@ def test_what_nothing_disturbs_is_as_stated():
     """A covariance that is too small or too large by a tenth would show."""
     trials = breaks.force(breaks.Disturbance(), np.random.default_rng(1), 300)
     assert 0.91 < np.mean([trial.right for trial in trials]) < 0.99
-
-
-def test_the_page_states_the_constants_of_the_study():
-    """The words before the table, and no widening that they do not name."""
-    text = " ".join(PAGE[PAGE.index("Each row raises one") : PAGE.index("figures: breaks ")].split())
-    looks = "{}, {}, {} and {:,}".format(*rated.LOOKS)
-    for stated in (
-        f"at least {100 * breaks.HOLDS:.0f} of 100",
-        looks,
-        f"z = {rated.Z}",
-        f"estimate, {breaks.CLOSE_N:g} N",
-        f"noise of {breaks.SIGMA_N:g} N per unit",
-        f"{breaks.PUSH_N:g} N",
-    ):
-        assert stated in text
-    run = KNOBS["friction"].runs["interval"]
-    assert (run.level, run.telling) == (breaks.HOLDS, breaks.TELLS)
-    assert f"or {run.most} at most" in text
 
 
 def test_an_interval_holds_its_ends_and_nothing_beyond():

@@ -1,8 +1,6 @@
-"""What the pages state of the labeller's last record: touches at every place, recordings, bounds."""
+"""What the page states of the labeller's last record: touches at every place."""
 
 import itertools
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,15 +8,10 @@ from sample import sample
 from study_pages import section
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance import labellers as label_figures
-from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs/performance.md").read_text()
-TABLES = "\n".join(section("performance.md", name) for name in ("labeller", "labeller_recorded"))
 SQUARE = Skin(settle_us=15.0)
 
 
@@ -59,38 +52,10 @@ def test_every_place_is_every_offset_of_the_frame():
 def test_the_gateware_is_as_late_as_the_page_says(places, labeller, connectivity):
     """The worst touch goes through the compiled labeller; the row of the table is that of a new run."""
     skin = SQUARE.replace(labeller=labeller, connectivity=connectivity)
-    assert label_figures.labeller_row(skin, places) in TABLES.splitlines()
+    assert label_figures.labeller_row(skin, places) in section("performance.md", "labeller").splitlines()
     rows, _ = places
     clocks = volume.last_record_clocks(rows, connectivity, labeller)
     worst = np.zeros((1, 16, 16), bool)
     worst[0, -2:] = rows[clocks.argmax()]
     with LabelBench(skin) as bench:
         assert bench.run(worst).last_record_clocks[0] == clocks.max()
-
-
-def test_no_line_of_the_tables_is_above_its_bound():
-    lines = re.findall(r"\| (\d+) / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", TABLES)
-    lines += [
-        (*found, found[2], limit) for *found, limit in re.findall(r"\| (\d+) / (\d+) / (\d+), (\d+)(?= \|)", TABLES)
-    ]
-    assert len(lines) >= 12 + 10
-    for line in lines:
-        values = list(map(int, line))
-        assert values == sorted(values)
-
-
-def test_the_text_says_what_the_tables_say():
-    text = " ".join(PAGE.split())
-    (run,) = re.findall(r"\| `run` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks \| \d+ \|", TABLES)
-    (serial,) = re.findall(r"\| `serial` \| 16x16 \| 8 \| .* clocks \| (\d+) clocks", TABLES)
-    assert f"its last record at most {run} clocks after the last row." in text
-    assert re.search(rf"\bneeds up to {serial} clocks\b", text)
-    recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", TABLES)
-    most, worst = (max(map(int, column)) for column in zip(*recorded))
-    assert f"On five sheets they take {most} clocks or fewer in 99 % and up to {worst}," in text
-
-
-@pytest.mark.skipif(not (ROOT / scans.RECORDINGS).is_dir(), reason="no recordings")
-def test_the_recordings_table_is_up_to_date():
-    recordings = scans.recordings(ROOT / scans.RECORDINGS)
-    assert writer.spelled(label_figures.recorded_table(recordings)) == section("performance.md", "labeller_recorded")

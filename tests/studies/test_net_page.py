@@ -1,47 +1,10 @@
-"""The page on networks: its tables and its picture show the same runs."""
+"""The picture of the page on networks shows the figures of its table."""
 
-import collections
 from pathlib import Path
 
-import pytest
-
-from contactfpga_sim.lab.net import load, tables
-from contactfpga_sim.lab.registry import StudyRun
-from contactfpga_sim.lab.studies import STUDIES
+from contactfpga_sim.lab.net import tables
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(autouse=True)
-def at_the_root(monkeypatch):
-    monkeypatch.chdir(ROOT)
-
-
-def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, tmp_path):
-    runs = collections.Counter()
-
-    def measure(links, batch_s, full):
-        runs[links, batch_s, full] += 1
-        cpu = dict.fromkeys(("publishers", "router", "reader", "other reader"), 0.1)
-        times = {"latency": (0.01, 0.02), "bare": (0.001, 0.002)}
-        return load.NetworkRun(links=links, frames=1000.0, messages=100.0, share=1.0, lost=0, cpu=cpu, **times)
-
-    monkeypatch.setattr(load, "measure", measure)
-    tables.measured.cache_clear()
-    try:
-        run = StudyRun(STUDIES["net"])
-        for name in run.study.sections:
-            run.text(name)
-        tables.draw(tmp_path)
-    finally:
-        tables.measured.cache_clear()
-    assert set(runs.values()) == {1}
-    assert len(runs) == len(tables.BATCHES_MS) + len(tables.LINKS)
-
-
-def test_the_picture_shows_the_pages_table(tmp_path):
-    drawn = tables.draw(tmp_path)
-    assert drawn.read_text(encoding="utf-8") == (ROOT / "docs/images/net.svg").read_text(encoding="utf-8")
 
 
 def test_the_picture_has_the_figures_of_its_rows(tmp_path, monkeypatch):

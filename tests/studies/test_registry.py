@@ -1,5 +1,7 @@
-"""The studies: each section of a page has one owner, and a toy study is made, listed and found out of date."""
+"""The studies: each section of a page has one owner and shows what its study makes; a toy study is made, listed and
+found out of date."""
 
+import functools
 import inspect
 import re
 import sys
@@ -27,7 +29,29 @@ PLACES = [
     )
     if place
 ]
-SAMPLES = [(study, name) for study in DECLARED for name, section in study.sections.items() if section.sample]
+SECTIONS = [(study.name, name, section) for study in DECLARED for name, section in study.sections.items()]
+QUICK = {"cover", "failures", "haptics", "kits", "maker", "safety", "settle", "skin", "units"}
+"""Studies whose samples `make test` makes; the other samples are for `make test-all`."""
+WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "mujoco observer", "performance",
+         "safety", "tracking scores"}  # fmt: skip
+"""Studies, and sections, that `make campaign` makes whole; of a section that is named no sample is made."""
+SHOWN = [
+    *(
+        pytest.param(study, name, section.sample, marks=() if study in QUICK else pytest.mark.slow)
+        for study, name, section in SECTIONS
+        if section.sample and f"{study} {name}" not in WHOLE
+    ),
+    *(
+        pytest.param(study, name, section.makes, marks=(pytest.mark.campaign, pytest.mark.timeout(7200)))
+        for study, name, section in SECTIONS
+        if {study, f"{study} {name}"} & WHOLE
+    ),
+]
+DRAWN = [
+    *("maker", "net", "scenes", "tracking"),
+    pytest.param("diagrams", marks=pytest.mark.slow),
+    pytest.param("arm", marks=(pytest.mark.campaign, pytest.mark.timeout(7200))),
+]
 
 
 def test_each_section_of_a_page_has_one_owner():
@@ -64,14 +88,27 @@ def test_each_function_that_is_declared_exists(study, place):
     assert wanted in ((drawn, drawn + 1) if study.compute else (drawn,))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("study", "name"), SAMPLES, ids=lambda value: value if isinstance(value, str) else value.name)
-def test_a_part_of_each_section_that_is_quick_to_make_is_up_to_date(study, name):
-    absent = runner.lacking((*study.needs, *study.sections[name].needs))
+@functools.cache
+def run_of(study):
+    return StudyRun(STUDIES[study])
+
+
+@pytest.mark.parametrize(("study", "name", "place"), SHOWN)
+def test_a_page_shows_what_its_study_makes(study, name, place):
+    """A sample of the section, or all of it."""
+    declared = STUDIES[study]
+    absent = runner.lacking((*declared.needs, *declared.sections[name].needs))
     if absent:
         pytest.skip(f"needs {', '.join(absent)}")
-    part = StudyRun(study).call(study.sections[name].sample)
-    assert f"\n{part}\n" in f"\n{section(study.page_of(name), name)}\n"
+    made = run_of(study).call(place)
+    assert f"\n{made}\n" in f"\n{section(declared.page_of(name), name)}\n"
+
+
+@pytest.mark.parametrize("study", DRAWN)
+def test_a_page_shows_the_pictures_that_its_study_draws(study, tmp_path):
+    drawn = run_of(study).call(STUDIES[study].pictures, tmp_path)
+    for picture in drawn if isinstance(drawn, list) else [drawn]:
+        assert picture.read_bytes() == (DOCS / "images" / picture.name).read_bytes(), picture.name
 
 
 MOST_ROWS = 20
@@ -205,14 +242,14 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
 @pytest.mark.slow
 def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
     from contactfpga_sim.lab import size
-    from contactfpga_sim.lab.several import tables
+    from contactfpga_sim.lab.closed import tables
 
     monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured
-    several = STUDIES["several"]
-    before = meaning.fingerprint(several, "several_size")
-    assert meaning.fingerprint(several, "several_size") == before
-    monkeypatch.setattr(tables, "SKIN", tables.SKIN.replace(zone_capacity=5))
-    assert meaning.fingerprint(several, "several_size") != before
+    closed, skin_of = STUDIES["closed"], tables.skin_of
+    before = meaning.fingerprint(closed, "closed_size")
+    assert meaning.fingerprint(closed, "closed_size") == before
+    monkeypatch.setattr(tables, "skin_of", lambda *given: skin_of(*given).replace(columns=12))
+    assert meaning.fingerprint(closed, "closed_size") != before
 
 
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):

@@ -1,28 +1,15 @@
-"""Break points of a precharged scan: the page against a new run of what is quick, and against closed forms."""
+"""Break points of a precharged scan: found again where the page says, and against closed forms."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import outdated, section
+from study_pages import section
 
 from contactfpga.design.circuit import Circuit
 from contactfpga_sim.lab.settle import breaks, tables
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
-
-
-def test_the_page_has_what_a_new_run_says():
-    assert not outdated("settle", "shorted")
-
-
-def test_the_comparison_on_the_page_is_wide_and_close():
-    rows = section("settle.md", "agreement").splitlines()[2:]
-    errors = [abs(float(re.search(r"([-+][\d.]+) % \|$", row)[1])) for row in rows]
-    assert len(errors) >= 30
-    assert max(errors) < 5
-    assert {"8x8", "64x64"} <= {row.split(" | ")[1] for row in rows}
 
 
 @pytest.mark.parametrize("name", breaks.KNOBS)

@@ -44,19 +44,6 @@ def test_each_board_has_the_packets_and_frames_of_its_bridge(board):
     assert (chip.frame_us, chip.payload_bytes) == ((125, 510) if high else (1000, 62))
 
 
-def test_a_delimiter_waits_for_the_next_microframe_and_no_longer():
-    """17 bytes at rest: from none to a microframe after the last byte, and 1.233 us on the bus."""
-    line = stream(packet(1000, 17))
-    late = delivered(BridgeSettings(FAST), CLOCK_HZ, line, 16)
-    at = end_us(line, 16)
-    # In 1 of 300 phases the timer has just emptied the chip when the delimiter comes, so that it is the first byte.
-    whole = HIGH_US[17]
-    assert late.low.min() == pytest.approx(at + whole, abs=1e-9)
-    assert late.quantile(0.5) == pytest.approx(at + whole + 62.5, abs=1)
-    assert late.share(np.array([at + 125 + whole]))[0] == pytest.approx(1 - 40 / 12 / 1000, abs=1e-3)
-    assert late.worst == pytest.approx(at + 1000 + HIGH_US[1], abs=1e-9)
-
-
 def test_a_packet_that_no_timer_meets_takes_a_microframe_to_the_digit():
     """Two packets in a row: the first one starts the timer anew, so it cannot run out within the second."""
     line = stream(packet(1000, 17), packet(3000, 17))
@@ -66,25 +53,6 @@ def test_a_packet_that_no_timer_meets_takes_a_microframe_to_the_digit():
     assert late.worst == pytest.approx(at + 125 + HIGH_US[17], abs=1e-9)
     for share in (0.01, 0.25, 0.5, 0.99):
         assert late.quantile(share) == pytest.approx(at + HIGH_US[17] + 125 * share, abs=1e-9)
-
-
-def test_without_event_character_a_byte_waits_for_the_timer():
-    line = stream(packet(1000, 17), since=-2 * 192_000, until=400_000)
-    late = delivered(BridgeSettings(FAST, 16, None), CLOCK_HZ, line, 16)
-    assert late.low.min() == pytest.approx(end_us(line, 16) + HIGH_US[17], abs=1e-9)
-    assert late.worst == pytest.approx(end_us(line, 16) + 16_000 + HIGH_US[1], abs=1e-9), "it has just missed the timer"
-    for share in (0.25, 0.5, 0.99):
-        assert late.quantile(share) == pytest.approx(end_us(line, 16) + 16_000 * share + HIGH_US[17], abs=1e-6)
-
-
-def test_a_full_speed_bridge_takes_a_frame():
-    line = stream(packet(1000, 17), packet(3000, 17), since=-96_000, until=60_000)
-    late = delivered(BridgeSettings(SLOW, 2), CLOCK_HZ, line, 33)
-    one_us = 8 * (13 + 2 + 17) / 12
-    assert late.low.min() == pytest.approx(end_us(line, 33) + 2 * one_us, abs=1e-9), "both packets wait for it"
-    most = end_us(line, 33) + 1000 + one_us
-    assert late.share(np.array([most]))[0] == pytest.approx(1 - 40 / 12 / 2000, abs=1e-9)
-    assert late.worst == pytest.approx(end_us(line, 33) + 2000 + 8 * (13 + 2 + 1) / 12, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -138,21 +106,6 @@ def test_the_chip_that_is_stepped_sends_the_same(event):
         assert at - 125 + bus == pytest.approx(middle, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_the_event_character_is_never_later_than_the_timer_and_a_short_timer_than_a_long_one(seed):
-    rng = random.Random(seed)
-    line = stream(packet(rng.randrange(4000), rng.choice([2, 17, 60])), since=-2 * 192_000, until=500_000)
-    byte = len(line.times) - 1
-    chips = [BridgeSettings(FAST, 1), BridgeSettings(FAST, 1, None), BridgeSettings(FAST, 4, None)]
-    late = [delivered(one, CLOCK_HZ, line, byte) for one in (*chips, BridgeSettings(FAST, 16, None))]
-    for share in (0.001, 0.1, 0.5, 0.9, 0.99, 1.0):
-        times = [one.quantile(share) for one in late]
-        assert (np.diff(times) > -1e-6).all()
-    for one in late:
-        found = one.spread()
-        assert end_us(line, byte) < found.median <= found.p99 <= found.worst
-
-
 def test_a_delimiter_that_is_the_first_byte_of_its_packet_closes_none():
     """AN232B-04, "Event Characters"; it is what the worst phase of a single packet costs."""
     chip = BridgeChip(FAST.payload_bytes, 1000, 0)
@@ -162,18 +115,6 @@ def test_a_delimiter_that_is_the_first_byte_of_its_packet_closes_none():
     assert chip.take(2000) == [b"\0"]
     late = delivered(BridgeSettings(FAST), CLOCK_HZ, stream(packet(1000, 17)), 16)
     assert late.worst - late.quantile(0.99) > 800
-
-
-@pytest.mark.parametrize("planted", ["payload_bytes", "frame_us"])
-def test_a_wrong_chip_is_seen(monkeypatch, planted):
-    """What the stepped oracle says of a chip whose packets are a byte longer, or whose frames are 1 us longer."""
-    line = stream(*(packet(1152 * number, 17) for number in range(-80, 80)), since=-90_000, until=150_000)
-    settings = BridgeSettings(FAST, 16, None) if planted == "payload_bytes" else BridgeSettings(FAST)
-    line = line._replace(since=-2 * settings.period_us * MHZ - 90_000) if settings.event is None else line
-    late = delivered(settings, CLOCK_HZ, line, 17 * 85 + 16)
-    whole = getattr(FAST, planted)
-    monkeypatch.setattr(Bridge, planted, property(lambda _: whole + 1))
-    assert abs(delivered(settings, CLOCK_HZ, line, 17 * 85 + 16).quantile(0.5) - late.quantile(0.5)) > 0.1
 
 
 def test_what_cannot_be_told_is_refused():

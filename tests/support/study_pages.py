@@ -14,10 +14,8 @@ def section(page, name):
     return beside.whole(DOCS / page, name)
 
 
-def outdated(study, *names, without=(), computed=None):
-    """Sections of a study, of these names or all, that it would make otherwise now; ``computed``: what they share."""
+def outdated(study, computed, *names):
+    """Sections of a study, of these names or all, that it would make otherwise of these results."""
     run = StudyRun(STUDIES[study])
-    if computed is not None:
-        run.computed = computed
-    named = names or [name for name in run.study.sections if name not in without]
-    return [name for name in named if run.text(name) != section(run.study.page_of(name), name)]
+    run.computed = computed
+    return [name for name in names or run.study.sections if run.text(name) != section(run.study.page_of(name), name)]

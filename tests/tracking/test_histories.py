@@ -110,19 +110,6 @@ def test_each_id_is_in_one_place_and_each_zone_has_one_contact(told):
             assert {id(track.zone) for track in tracks.active if not track.held} == {id(zone) for zone in zones}
 
 
-def test_time_counts_from_anywhere(told):
-    frames, _ = told
-    times = [zones.time_us for zones in frames]
-    until = next((at for at in range(1, len(times)) if times[at] < times[at - 1]), 60)  # its board restarts
-    part = frames[: min(until, 60)]
-    assert part
-    later = [moments(zones.time_us + 10**9, zones.records.tolist(), zones.flags) for zones in part]
-    first, second = run(Tracker(), part), run(Tracker(), later)
-    assert [[(one.kind, one.id) for one in said.events] for said in first] == [
-        [(one.kind, one.id) for one in said.events] for said in second
-    ]
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_contacts_that_stay_apart_are_those_of_the_best_assignment_by_brute_force(seed):
     """Three to five fingers that move less than they are apart, at 100 frames per second."""

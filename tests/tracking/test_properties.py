@@ -129,13 +129,6 @@ def test_speeds_stay_finite_where_many_frames_have_one_time():
     assert all(abs(track.vx_mm_s) < 1e5 for tracks in said for track in tracks.active)
 
 
-def test_a_place_that_is_no_number_is_refused():
-    """Zones of a frame come from whole numbers; only a setting can be NaN."""
-    for name in ("gate_mm", "hold_ms", "shared_ms", "move_mm"):
-        with pytest.raises(ValueError, match=f"^{name} is nan; it must be a number"):
-            Tracker(**{name: math.nan})
-
-
 def test_what_it_remembers_is_bounded():
     """Contacts that come, meet and go for 5,000 frames leave nothing behind."""
     rng, tracker, most = random.Random(1), Tracker(shared_ms=50), 0

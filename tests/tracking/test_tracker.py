@@ -174,11 +174,6 @@ def test_a_frame_with_mismatch_changes_nothing():
     assert ids(tracker.update(frame(51 * MS, [(5, 5)]))) == [1]
 
 
-def test_frames_that_were_lost_end_nothing():
-    said = run(Tracker(), [frame(0, [(5, 5)]), frame(3_600_000 * MS, [(5.5, 5)])])
-    assert events(said) == [("down", 1), ("move", 1)]
-
-
 def test_a_speed_is_not_believed_across_a_long_gap():
     fast = sequence(lambda n: [(2 + n * 0.05, 5)], 40)
     assert ids(run(Tracker(), [*fast, frame(3000 * MS, [(4.2, 5)])])[-1]) == [1]
@@ -194,10 +189,6 @@ def test_another_sheet_is_a_restart():
     said = run(Tracker(), [frame(0, [(5, 5)]), frame(MS, [(5, 5)], skin=Skin(pitch_x_mm=5.0))])
     assert events(said) == [("down", 1), ("up", 1), ("down", 2)]
     assert said[1].restarted
-
-
-def test_an_equal_sheet_of_another_hello_is_none():
-    assert not run(Tracker(), [frame(0, [(5, 5)]), frame(MS, [(5, 5)], skin=Skin())])[1].restarted
 
 
 def test_on_a_cylinder_a_contact_goes_on_across_the_seam():
