@@ -15,7 +15,6 @@ from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.recover import recover
-from contactfpga.wire.hello import Cutter
 
 SKIN = Skin()
 LONG = 60.0
@@ -43,24 +42,6 @@ def test_a_link_must_be_named_where_there_are_several(tmp_path):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}")
     with pytest.raises(contactfpga.ContactFPGAError, match="has no link 'leg'; it has left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link=leg")
-
-
-@pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])
-@pytest.mark.parametrize("size", [1, 7, 1000])
-def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
-    hello = ModelBoard(SKIN).hello()
-    data = before + hello + b"frame\0\0"
-    cutter, kept = Cutter(), b""
-    for at in range(0, len(data), size):
-        first, after = cutter.take(data[at : at + size])
-        kept += first
-        if after:
-            break
-    assert after
-    assert kept + after == data[: len(kept + after)]
-    assert kept.strip(b"\0") == before.strip(b"\0")
-    assert size < 1000 or after.startswith(b"\0")
-    assert after.lstrip(b"\0").startswith(hello.strip(b"\0"))
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):
@@ -215,36 +196,6 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
         np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
 
 
-@pytest.mark.slow
-def test_four_links_are_those_that_a_program_reads(tmp_path):
-    """A virtual board says the same whenever it is started: once recorded, once read."""
-    pytest.importorskip("amaranth")
-    example = (contactfpga.examples() / "robot.toml").read_text()
-    text = example.replace('urdf = "package', '# urdf = "package').replace(
-        'skin = "', f'skin = "{contactfpga.examples()}/'
-    )
-    (tmp_path / "robot.toml").write_text(text)
-    file = tmp_path / "x.mcap"
-    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.01", "--timeout", "60"]) == 0
-    recording = Recording(file)
-    body = Body.load(tmp_path / "robot.toml")
-    assert set(recording.links) == set(body.links)
-    assert len(body.links) == 4
-    for name, plan in body.links.items():
-        kept = [zones.to_dict() for _, _, zones in recording.frames(link=name)]
-        assert len(kept) > 50
-        with contactfpga.open(plan.port, plan.skin, timeout=60.0) as board:
-            live = [board.next(60.0).to_dict()]  # the answer to the first hello; frames before it are recorded, too
-            while live[-1]["time_us"] < kept[-1]["time_us"]:
-                live.append(board.next(60.0).to_dict())
-        for zones in live:  # a recording has no times of arrival
-            zones |= dict.fromkeys(("arrived_s", "host_time_s", "host_sigma_s"))
-        assert len(live) > 50
-        assert kept[-len(live) :] == live
-        with contactfpga.open(f"replay://{file}?link={name}", plan.skin) as board:
-            assert [zones.to_dict() for zones in board] == kept
-
-
 def test_a_link_that_is_lost_leaves_the_others(robot, tmp_path, capsys):
     path, (arm, shin) = robot
     body = Body.load(path)
@@ -269,23 +220,6 @@ def test_what_a_robot_file_says_itself(robot, tmp_path, capsys, option):
     value = "1000000" if option == "--baud" else "x.toml"
     assert cli.main(["record", str(tmp_path / "x.mcap"), str(robot[0]), option, value]) == 1
     assert "sets it for each link" in capsys.readouterr().err
-
-
-@pytest.mark.campaign  # a board with units takes a while to compile
-def test_links_of_a_robot_with_units_have_forces(tmp_path):
-    pytest.importorskip("amaranth")
-    examples = contactfpga.examples()
-    units = f"{examples}/units-flat.toml"
-    link = f"""[[links]]\nname = "arm"\nskin = "{examples}/force.toml"\nunits = "{units}"
-        port = "sim://?scene=two_fingers&units={units}"\npoint_m = [0.0, 0.0, 1.0]"""
-    (tmp_path / "robot.toml").write_text(link)
-    file = tmp_path / "x.mcap"
-    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.05", "--timeout", "60"]) == 0
-    with AnyReader([file]) as reader:
-        found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
-    pushes = [one.wrench.force.z for topic, message in found if topic == "/arm/contacts" for one in message.contacts]
-    assert min(pushes) < -1
-    assert any(topic == "/arm/wrench" for topic, _ in found)
 
 
 def test_forces_of_units_are_messages(tmp_path):
