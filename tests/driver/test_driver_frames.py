@@ -5,9 +5,8 @@ import gc
 import threading
 import time
 
-import numpy as np
 import pytest
-from fake_board import ZONE, FakeBoard, background, wait_until
+from fake_board import background, wait_until
 
 import contactfpga
 
@@ -181,30 +180,6 @@ def test_a_canceled_next_takes_no_frame(board):
             assert (await opened.next(LONG)).sequence == sent
 
     asyncio.run(use())
-
-
-@pytest.mark.parametrize("report", ["moments", "barycenter", "cells"])
-@pytest.mark.parametrize("surface", [{}, {"surface": "cylinder", "radius_mm": 60.0}])
-def test_a_batch_holds_what_the_frames_hold(report, surface):
-    skin = SKIN.replace(report=report, settle_us=20.0, **surface)
-    with FakeBoard(skin) as board, contactfpga.open(board.path, timeout=LONG) as opened:
-        opened.latest(LONG)
-        queue, frames = opened.subscribe(), opened.stats.frames
-        for moments in ([ZONE, (2, 20, 8)], [], [(1, 3, 3)]):
-            board.moments = moments
-            board.send(board.frame())
-        wait_until(lambda: opened.stats.frames == frames + 3)
-        batch = opened.batch()
-        single = [queue.next(LONG) for _ in range(3)]
-    assert batch.frames["sequence"].tolist() == [zones.sequence for zones in single]
-    assert batch.frames["host_time_s"].tolist() == [zones.host_time_s for zones in single]
-    assert batch.frames["total_zones"].tolist() == [zones.total_zones for zones in single]
-    assert batch.zones["frame"].tolist() == [index for index, zones in enumerate(single) for _ in zones]
-    assert batch.zones["time_us"].tolist() == [zones.time_us for zones in single for _ in zones]
-    arrays = np.concatenate([zones.array for zones in single])
-    for name in arrays.dtype.names:
-        same = np.array_equal if arrays.dtype[name].kind == "U" else np.allclose
-        assert same(batch.zones[name], arrays[name]), name
 
 
 # ---- threads, and the end

@@ -10,7 +10,7 @@ from wire import Wire, last_byte
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import faults
-from contactfpga.wire.faults import Faults, SelfTestSlot
+from contactfpga.wire.faults import Faults
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 
@@ -149,13 +149,6 @@ def test_reports_that_cannot_be_are_refused_and_those_of_other_boards_unknown():
     plain = Line(contactfpga.Skin())
     plain.give(plain.board.hello(), plain.board.wire.seal(b"\x81" + last_byte(9)))
     assert plain.host.stats.unknown_kinds == 1
-
-
-def test_slots_of_the_self_test_come_in_order():
-    line = Line(BOTH)
-    line.hello()
-    found = line.give(*(line.board.wire.slot(number, 1 << number % 16, 0b101) for number in (0, 17, 16_383)))
-    assert found == [SelfTestSlot(number, (number % 16,), (0, 2)) for number in (0, 17, 16_383)]
 
 
 def test_encoders_agree_with_an_independent_one():
