@@ -59,15 +59,15 @@ def test_a_paced_board_goes_on_while_nobody_reads_and_is_never_ahead(pace):
 def test_simulated_board_loses_nothing():
     """By the frames, and by the gateware's own counters: at each hello the frames sent are those received."""
     with contactfpga.open("sim://?scene=moving") as opened:
-        frames = list(itertools.islice(opened, 12_000))
+        frames = list(itertools.islice(opened, 7_000))
         stats = opened.stats
-        assert opened.hello.sent > 10_000
+        assert opened.hello.sent > 5_000
         assert frames[-1].time_us == pytest.approx(opened.clock() * 1e6, abs=1000)
     assert stats.restarts == stats.unexplained == 0
     steps = {after.time_us - before.time_us for before, after in itertools.pairwise(frames)}
     assert stats.lost == 0
     assert not stats.damaged
-    assert stats.hellos >= 3  # the one asked for and two of their own in over a second
+    assert stats.hellos >= 2  # the one asked for and one of their own in over half a second
     assert steps == {96, 288}  # a hello takes the place of two frames now and then
     assert len({zones[0].x_mm for zones in frames}) > 20
 

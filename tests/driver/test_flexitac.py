@@ -118,17 +118,6 @@ def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated
     assert (stats.lost, stats.restarts, stats.unexplained, sum(stats.damaged.values())) == (0, 0, 0, 0)
 
 
-def test_a_recording_of_it_gives_the_same_zones(tmp_path):
-    file = tmp_path / "flexitac.rec"
-    touch = Touch((4, 6))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file, timeout=LONG) as board:
-        seen = frames_of(board, sheet, touch, 20)
-    with contactfpga.open(f"replay://{file}") as board:
-        again = {zones.frame.sequence: zones.records.tolist() for zones in board}
-    assert {zones.frame.sequence: zones.records.tolist() for zones in seen}.items() <= again.items()
-    assert any(len(zones) for zones in seen)
-
-
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
     """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
     touch = Touch((8, 16))

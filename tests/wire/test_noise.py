@@ -64,14 +64,6 @@ def lines(request, rng):
     return [Line(SKINS[request.param], rng) for _ in range(LINES)]
 
 
-def test_a_lost_byte_costs_its_frame_and_a_lost_delimiter_the_next_one_as_well(lines, record_property):
-    for line in lines:
-        for at in range(len(line.hit)):
-            delimiter = at == len(line.hit) - 1
-            assert line.lost(line.hit[:at] + line.hit[at + 1 :]) == ([HIT, HIT + 1] if delimiter else [HIT])
-    record_property("cases", sum(len(line.hit) for line in lines))
-
-
 def test_lost_runs_of_bytes_cost_no_frame_behind_the_next_one(lines, record_property):
     cases = 0
     for line in lines:
