@@ -15,6 +15,7 @@ from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.recover import recover
+from contactfpga.wire.hello import Cutter
 
 SKIN = Skin()
 LONG = 60.0
@@ -42,6 +43,24 @@ def test_a_link_must_be_named_where_there_are_several(tmp_path):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}")
     with pytest.raises(contactfpga.ContactFPGAError, match="has no link 'leg'; it has left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link=leg")
+
+
+@pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
+    hello = ModelBoard(SKIN).hello()
+    data = before + hello + b"frame\0\0"
+    cutter, kept = Cutter(), b""
+    for at in range(0, len(data), size):
+        first, after = cutter.take(data[at : at + size])
+        kept += first
+        if after:
+            break
+    assert after
+    assert kept + after == data[: len(kept + after)]
+    assert kept.strip(b"\0") == before.strip(b"\0")
+    assert size < 1000 or after.startswith(b"\0")
+    assert after.lstrip(b"\0").startswith(hello.strip(b"\0"))
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):

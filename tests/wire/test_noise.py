@@ -89,7 +89,7 @@ def test_a_wrong_byte_costs_its_frame_and_a_wrong_delimiter_the_next_one_as_well
     for line in lines[:1]:
         for at, byte in enumerate(line.hit):
             delimiter = at == len(line.hit) - 1
-            for wrong in sorted(set(range(256)) - {byte})[at % 3 :: 3]:  # a third each place, all values over some
+            for wrong in sorted(set(range(256)) - {byte})[at % 5 :: 5]:  # a fifth each place, all values over some
                 lost = line.lost(line.hit[:at] + bytes([wrong]) + line.hit[at + 1 :])
                 assert lost == ([HIT, HIT + 1] if delimiter else [HIT])
                 cases += 1
@@ -133,8 +133,8 @@ def passing(packets, table):
     return np.flatnonzero((packets[:, -3] == parts[0]) & (packets[:, -2] == parts[1]) & (packets[:, -1] == parts[2]))
 
 
-PACKETS = 10_000_000
-PER_LENGTH = 400_000
+PACKETS = 4_000_000
+PER_LENGTH = 160_000
 LENGTHS = range(5, 5 + PACKETS // PER_LENGTH)
 
 
