@@ -46,7 +46,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 @pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="this system has no /proc")
-def test_descriptors_and_threads_stay_as_they_were(board):
+def test_descriptors_and_threads_do_not_grow(board):
     def once():
         with opened(board) as host:
             host.read(LONG)
@@ -58,8 +58,8 @@ def test_descriptors_and_threads_stay_as_they_were(board):
     before, threads = len(os.listdir("/proc/self/fd")), threading.active_count()
     for _ in range(3):
         once()
-    assert len(os.listdir("/proc/self/fd")) == before
-    assert threading.active_count() == threads
+    assert len(os.listdir("/proc/self/fd")) <= before, "fewer, where an earlier test's are given back meanwhile"
+    assert threading.active_count() <= threads
 
 
 @pytest.mark.parametrize("port", ["sim://", "replay://x", "/dev/x#1", "zenoh://x"])
