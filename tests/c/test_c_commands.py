@@ -2,11 +2,10 @@
 
 import functools
 import random
-import subprocess
 
 import c_vectors
 import pytest
-from c_compilers import COMPILERS, FOLDER
+from c_compilers import answers, program
 from wire import request
 
 from contactfpga.wire.command import Command, encode_command
@@ -36,14 +35,11 @@ int main(void) {
 @pytest.fixture(scope="module")
 def ask(tmp_path_factory):
     """Requests and commands by the header: of (number, what, value, hello, pulsed), ``what`` -1 for a request."""
-    folder = tmp_path_factory.mktemp("ask")
-    (folder / "ask.c").write_text(ASK)
-    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", folder / "ask", folder / "ask.c"], check=True, timeout=250)
+    compiled = program(tmp_path_factory.mktemp("ask"), ASK)
 
     def run(asked):
         lines = "".join(" ".join(str(int(word)) for word in one) + "\n" for one in asked)
-        done = subprocess.run([folder / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=250)
-        return [bytes.fromhex(line) for line in done.stdout.splitlines()]
+        return [bytes.fromhex(line) for line in answers(compiled, lines)]
 
     return run
 
@@ -80,7 +76,7 @@ def test_values_for_units_are_those_of_the_driver(tmp_path):
 #include <stdio.h>
 #include "contactfpga.h"
 int main(void) {
-    contactfpga_hello hello = {0};
+    static contactfpga_hello hello;
     unsigned what, place, units, bits, sums, sum_bits;
     unsigned long steps;
     while (scanf("%u %u %u %u %u %u %lu", &units, &bits, &sums, &sum_bits, &what, &place, &steps) == 7) {
@@ -93,9 +89,6 @@ int main(void) {
     return 0;
 }
 """
-    (tmp_path / "v.c").write_text(code.replace("\\\\n", "\\n"))
-    command = [part for part in COMPILERS["gcc"] if part != "-Wextra"]
-    subprocess.run([*command, f"-I{FOLDER}", "-o", tmp_path / "v", tmp_path / "v.c"], check=True, timeout=250)
     rng, lines, meant = random.Random(4), [], []
     for _ in range(400):
         facts = UnitFacts(rng.randint(1, 8), rng.randint(1, 28), rng.randint(0, 4), rng.randint(1, 31), 1, 1)
@@ -104,10 +97,7 @@ int main(void) {
         shape = (facts.count, facts.bits, facts.sums, facts.sum_bits)
         lines.append(" ".join(map(str, (*shape, what, place, steps))) + "\n")
         meant.append(f"1 {found}" if (found := by_driver(facts, what, place, steps)) is not None else "0 0")
-    done = subprocess.run(
-        [tmp_path / "v"], input="".join(lines), capture_output=True, text=True, check=True, timeout=250
-    )
-    assert done.stdout.splitlines() == meant
+    assert answers(program(tmp_path, code), "".join(lines)) == meant
 
 
 def by_driver(facts: UnitFacts, what: int, place: int, steps: int) -> int | None:

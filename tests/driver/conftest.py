@@ -5,7 +5,7 @@ import pytest
 from contactfpga.driver import driver, native
 from contactfpga.driver.requests import Requests
 
-WITH_EITHER = ("test_driver", "test_driver_frames", "test_silence", "test_recording")
+WITH_EITHER = ("test_driver", "test_driver_frames", "test_recording")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -1,26 +1,10 @@
 """Bytes and the clock in, events out: chunks, counters, times, restarts, other Skins, old boards."""
 
-import random
-
 import pytest
-from model_board import SCAN_US, SKIN, Line, ModelBoard, arrived
+from model_board import SCAN_US, SKIN, Line
 from wire import EPOCH_US, Wire, last_byte
 
 from contactfpga.driver.conversation import Conversation
-
-
-def test_chunks_do_not_matter():
-    board, rng = ModelBoard(SKIN), random.Random(3)
-    stream = board.hello() + b"".join(board.frame() for _ in range(300))
-    for _ in range(20):
-        host, found, rest = Conversation("x"), [], stream
-        while rest:
-            cut = rng.randrange(1, 60)
-            found += arrived(host.receive(rest[:cut], 0.0))
-            rest = rest[cut:]
-        assert [zones.sequence for zones in found] == [i % 256 for i in range(300)]
-        assert host.stats.lost == 0
-        assert not host.stats.damaged
 
 
 def test_noise_without_a_single_zero_keeps_no_more_than_a_packet():
@@ -29,24 +13,6 @@ def test_noise_without_a_single_zero_keeps_no_more_than_a_packet():
         host.receive(b"\xaa" * 4096, 0.0)
         assert len(host._rest) < 20_000
     assert host.stats.damaged["noise"] > 10
-
-
-def test_overflow_carries_what_fits_and_says_so():
-    line = Line(SKIN.replace(zone_capacity=2))
-    line.hello()
-    line.board.moments = [(2, 1, 0), (3, 3, 3)]
-    (zones,) = line.frame(cells=40, zones=17, flags=["overflow"])
-    assert len(zones) == 2
-    assert (zones.total_zones, zones.pressed, zones.flags) == (17, 40, {"overflow"})
-
-
-def test_a_fault_is_told_by_name_and_counted_in_the_hello():
-    line = Line()
-    line.hello(stuck=3)
-    (zones,) = line.frame(flags=["fault"])
-    assert zones.faults == ("stuck",)
-    assert line.host.hello.stuck == 3
-    assert line.frame()[0].faults == ()
 
 
 def test_packets_without_a_meaning_are_counted():

@@ -1,14 +1,10 @@
 """What the conversation makes of losses, restarts and other Skins."""
 
-from types import SimpleNamespace
-
 import pytest
 from model_board import SCAN_US, SKIN, Line, ModelBoard, arrived
 from wire import Wire, old_frame, old_hello
 
 import contactfpga
-from contactfpga.driver.stats import Stats
-from contactfpga.tools.console.views import status
 
 
 def errors(events):
@@ -32,19 +28,6 @@ def test_losses_are_exact_from_the_next_hello_on(missing):
     line.hello()
     assert line.stats.lost == missing
     assert line.stats.restarts == 0
-
-
-def test_frames_lost_before_a_hello_are_counted_once():
-    line = Line()
-    line.hello()
-    line.frame()
-    for _ in range(5):
-        line.board.frame()
-    line.hello()
-    assert line.stats.lost == 5
-    line.board.frame()
-    line.frame()
-    assert line.stats.lost == 6
 
 
 def test_frames_sent_before_the_port_was_opened_are_no_loss():
@@ -124,28 +107,6 @@ def test_a_restart_whose_hello_is_lost_gives_no_wrong_time(up_us, asked):
     assert line.frame()[0].time_us == expected
 
 
-def test_frames_lost_since_a_restart_are_counted():
-    line = Line()
-    line.board.sent, line.board.heard = 1000, 3
-    line.hello()
-    line.frame()
-    line.board.power_up()
-    line.board.frame()
-    line.board.frame()
-    line.frame()
-    line.hello()
-    assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (1, 2, 1)
-
-
-def test_overwritten_frames_are_counted_from_the_differences():
-    line = Line()
-    line.hello()
-    line.frame(overwritten=14)
-    line.frame(overwritten=16 + 3)
-    line.frame(overwritten=16 + 3)
-    assert line.stats.overwritten == 5
-
-
 # ---- other Skins, old boards
 
 
@@ -208,13 +169,3 @@ def test_a_new_name_is_no_new_skin():
     assert not errors(line.hello())
     assert line.host.hello.name == "right"
     assert line.stats.skin_changes == 0
-
-
-def test_the_line_below_a_frame_says_what_was_lost():
-    line = Line()
-    line.hello()
-    (zones,) = line.frame(flags=["fault"])
-    board = SimpleNamespace(port="x", stats=Stats(lost=3))
-    told = str(status(board, zones, 200))
-    assert "stuck" in told
-    assert "frames, 3 lost, " in told

@@ -2,9 +2,7 @@
 
 import collections
 import contextlib
-import functools
 import itertools
-import threading
 import time
 
 import numpy as np
@@ -44,24 +42,6 @@ def test_simulated_board_answers_read_zones():
     assert sum(zone.area_cells for zone in zones) == zones.pressed
 
 
-def test_a_second_read_is_of_a_later_frame():
-    first, second = (contactfpga.read_zones("sim://?scene=two_fingers") for _ in range(2))
-    assert second.time_us > first.time_us
-
-
-@pytest.mark.campaign
-def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
-    file = tmp_path / "skin.toml"
-    file.write_text(SKIN.replace(send="on_change").to_toml())
-    with contactfpga.open(f"sim://?skin={file}") as opened:
-        answered = opened.next()
-        before = opened.clock()
-        with pytest.raises(contactfpga.BoardSilent, match=r"within 0\.01 s"):
-            opened.next(0.01)
-        assert opened.clock() - before == pytest.approx(0.01)
-        assert opened.next(0.1).time_us - answered.time_us == pytest.approx(100_000, abs=2 * 96)  # the keep-alive
-
-
 @pytest.mark.parametrize("pace", [1.0, 0.2])
 def test_a_paced_board_goes_on_while_nobody_reads_and_is_never_ahead(pace):
     began_s = time.monotonic()
@@ -79,28 +59,17 @@ def test_a_paced_board_goes_on_while_nobody_reads_and_is_never_ahead(pace):
 def test_simulated_board_loses_nothing():
     """By the frames, and by the gateware's own counters: at each hello the frames sent are those received."""
     with contactfpga.open("sim://?scene=moving") as opened:
-        frames = list(itertools.islice(opened, 12_000))
+        frames = list(itertools.islice(opened, 7_000))
         stats = opened.stats
-        assert opened.hello.sent > 10_000
+        assert opened.hello.sent > 5_000
         assert frames[-1].time_us == pytest.approx(opened.clock() * 1e6, abs=1000)
     assert stats.restarts == stats.unexplained == 0
     steps = {after.time_us - before.time_us for before, after in itertools.pairwise(frames)}
     assert stats.lost == 0
     assert not stats.damaged
-    assert stats.hellos >= 3  # the one asked for and two of their own in over a second
+    assert stats.hellos >= 2  # the one asked for and one of their own in over half a second
     assert steps == {96, 288}  # a hello takes the place of two frames now and then
     assert len({zones[0].x_mm for zones in frames}) > 20
-
-
-@pytest.mark.campaign  # test_addresses.py has one
-def test_simulated_board_of_a_file(tmp_path):
-    skin = contactfpga.Skin(rows=5, columns=7, pitch_x_mm=3.0, report="cells", settle_us=20.0)
-    file = tmp_path / "skin.toml"
-    file.write_text(skin.to_toml())
-    with contactfpga.open(f"sim://?skin={file}&scene=full", skin=skin) as opened:
-        zones = opened.read()
-    assert zones.cells.shape == (5, 7)
-    assert zones.cells.all()
 
 
 def test_simulated_board_with_an_unknown_option():
@@ -208,51 +177,7 @@ def test_a_closed_simulated_board_says_so_every_time(call):
             virtual.clock()
 
 
-def test_close_wakes_a_thread_that_iterates_a_simulated_board():
-    def close_soon(opened):
-        wait_until(lambda: opened.stats.frames > 10)
-        opened.close()
-
-    for _ in range(5):
-        opened = contactfpga.open("sim://")
-        with background(functools.partial(close_soon, opened)), pytest.raises(contactfpga.BoardClosed):
-            collections.deque(opened, maxlen=0)
-
-
-def test_several_threads_share_a_simulated_board():
-    found = []
-    with contactfpga.open("sim://?scene=moving") as opened:
-        first = opened.next().sequence
-
-        def take():
-            for _ in range(300):
-                found.append(opened.next().sequence)
-
-        threads = [threading.Thread(target=take) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert opened.stats.lost == 0
-    assert sorted(found) == sorted((first + 1 + index) % 256 for index in range(1200))
-
-
 # ---- a pseudo-terminal
-
-
-def test_the_board_on_a_pseudo_terminal_answers_read_zones(pty_board):
-    for _ in range(3):
-        zones = contactfpga.read_zones(pty_board.port, timeout=LONG)
-        assert len(zones) == 2
-
-
-def test_a_second_client_of_the_pseudo_terminal_is_refused_and_the_first_goes_on(pty_board):
-    with contactfpga.open(pty_board.port, timeout=LONG) as opened:
-        with pytest.raises(contactfpga.PortBusy, match="this program opened it already"):
-            contactfpga.open(pty_board.port, timeout=LONG)
-        assert len(opened.read(LONG)) == 2
-    with contactfpga.open(pty_board.port, timeout=LONG) as again:
-        assert len(again.read(LONG)) == 2
 
 
 def test_a_board_that_is_stopped_while_it_is_read_is_lost(pty_board):

@@ -10,7 +10,7 @@ from wire import Wire, last_byte
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import faults
-from contactfpga.wire.faults import Faults, SelfTestSlot
+from contactfpga.wire.faults import Faults
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 
@@ -151,13 +151,6 @@ def test_reports_that_cannot_be_are_refused_and_those_of_other_boards_unknown():
     assert plain.host.stats.unknown_kinds == 1
 
 
-def test_slots_of_the_self_test_come_in_order():
-    line = Line(BOTH)
-    line.hello()
-    found = line.give(*(line.board.wire.slot(number, 1 << number % 16, 0b101) for number in (0, 17, 16_383)))
-    assert found == [SelfTestSlot(number, (number % 16,), (0, 2)) for number in (0, 17, 16_383)]
-
-
 def test_encoders_agree_with_an_independent_one():
     for skin, word in ((GUARD, ROW_3 | STUCK_2), (BOTH, JOINED | 1), (TESTED, 1)):
         bits = faults.fault_bits(skin.rows, skin.columns, skin.guard, skin.self_test)
@@ -201,40 +194,25 @@ def test_frames_in_runs_have_the_faults_of_those_one_by_one():
 # ---- the logger
 
 
-def logged(caplog):
-    found = [(record.levelname, record.getMessage()) for record in caplog.records]
-    caplog.clear()
-    return found
-
-
-def test_the_logger_tells_of_faults_as_they_come_and_go(caplog):
+@pytest.mark.parametrize(
+    ("skin", "said", "warnings"),
+    [
+        (GUARD, (ROW_3, ROW_3, ROW_3 | COLUMN_7, 0), ["fault: row 3 open", "fault: column 7 open, row 3 open"]),
+        (contactfpga.Skin(), (2, 2, 0), ["columns that read pressed while no row was driven: 2"]),
+    ],
+    ids=["lines by name", "a number of columns"],
+)
+def test_the_logger_tells_of_faults_as_they_come_and_go(caplog, skin, said, warnings):
     caplog.set_level("INFO", "contactfpga")
-    port = DirectPort(GUARD)
+    port = DirectPort(skin)
     with contactfpga.open(port) as board:
         name = board.port
-        logged(caplog)
-        for word in (ROW_3, ROW_3, ROW_3 | COLUMN_7, 0):
-            port.word = word
-            port.send(port.report())
+        caplog.clear()
+        for port.word in said:
+            port.send(port.report() if skin.guard else port.hello(stuck=port.word))
             board.read()
-    assert logged(caplog) == [
-        ("WARNING", f"{name}: fault: row 3 open"),
-        ("WARNING", f"{name}: fault: column 7 open, row 3 open"),
-        ("INFO", f"{name}: no fault any more"),
-    ]
-
-
-def test_the_logger_tells_of_stuck_columns_of_a_board_that_names_none(caplog):
-    caplog.set_level("INFO", "contactfpga")
-    port = DirectPort(contactfpga.Skin())
-    with contactfpga.open(port) as board:
-        name = board.port
-        logged(caplog)
-        for stuck in (2, 2, 0):
-            port.send(port.hello(stuck=stuck))
-            board.read()
-    assert logged(caplog) == [
-        ("WARNING", f"{name}: columns that read pressed while no row was driven: 2"),
+    assert [(record.levelname, record.getMessage()) for record in caplog.records] == [
+        *(("WARNING", f"{name}: {warning}") for warning in warnings),
         ("INFO", f"{name}: no fault any more"),
     ]
 

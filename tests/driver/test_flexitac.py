@@ -9,7 +9,6 @@ from fake_board import patiently
 from scipy import ndimage
 
 import contactfpga
-from contactfpga import Tracker
 from contactfpga.driver import flexitac
 from contactfpga.driver.address import Flexitac, parse
 from contactfpga.driver.flexitac import Cells, Framer
@@ -117,27 +116,6 @@ def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated
     stats = simulated.stats
     assert stats.hellos - hellos == 4, "two per second"
     assert (stats.lost, stats.restarts, stats.unexplained, sum(stats.damaged.values())) == (0, 0, 0, 0)
-
-
-def test_a_touch_that_slides_is_one_track():
-    tracker = Tracker()
-    touch = Touch((8, 4), columns_per_s=20.0)
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
-        frames = frames_of(board, sheet, touch, 50)
-    events = [(event.kind, event.id) for frame in frames for event in tracker.update(frame).events]
-    assert [event for event in events if event[0] != "move"] == [("down", 1)]
-    assert events.count(("move", 1)) > 3
-
-
-def test_a_recording_of_it_gives_the_same_zones(tmp_path):
-    file = tmp_path / "flexitac.rec"
-    touch = Touch((4, 6))
-    with FlexitacSheet(touch) as sheet, contactfpga.open(address_of(sheet), record=file, timeout=LONG) as board:
-        seen = frames_of(board, sheet, touch, 20)
-    with contactfpga.open(f"replay://{file}") as board:
-        again = {zones.frame.sequence: zones.records.tolist() for zones in board}
-    assert {zones.frame.sequence: zones.records.tolist() for zones in seen}.items() <= again.items()
-    assert any(len(zones) for zones in seen)
 
 
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():

@@ -5,12 +5,10 @@ import random
 import pytest
 from model_board import ModelBoard
 from sample import sample
-from wire import request
 from world import Witness, World
 
 import contactfpga
 from contactfpga.driver.requests import MOST_APART, Requests
-from contactfpga.wire import protocol
 
 SKIN = contactfpga.Skin()
 
@@ -114,24 +112,6 @@ def test_the_logger_tells_of_the_board_its_restarts_and_losses(caplog):
 # ---- the numbers
 
 
-def test_requests_go_round_through_all_low_bits_and_hold_no_zero():
-    requests = Requests(random.Random(1))
-    requests.ask(0.0, 1.0)
-    ((number, hello),) = numbers(requests.data_to_send())
-    assert hello
-    requests.take_hello(number, False, 0.0)
-    requests.take_frame(number % 8, 0.0)
-    for step in range(400):
-        ((following, hello),) = numbers(requests.data_to_send())
-        assert not hello
-        assert protocol.may_number(following)
-        assert following % 8 == number % 8 % 7 + 1
-        requests.take_frame(following % 8, 0.0)
-        assert requests.answered == step + 1
-        number = following
-        requests.ask(0.0, 1.0)
-
-
 def known(rng=None):
     """Requests whose last number was seen in a frame."""
     requests = Requests(rng or random.Random(1))
@@ -162,18 +142,6 @@ def test_no_number_is_sent_that_a_frame_on_its_way_can_carry():
     assert requests.answered == MOST_APART + 3
 
 
-def test_many_that_ask_while_all_requests_are_lost_are_asked_for_anew():
-    requests = known()
-    for _ in range(MOST_APART + 5):
-        requests.ask(0.0, 2.0)
-    assert len(numbers(requests.data_to_send())) == MOST_APART + 1
-    requests.ask(0.4, 2.0)
-    assert not requests.data_to_send()
-    requests.poll(0.6)
-    ((_, hello),) = numbers(requests.data_to_send())
-    assert hello
-
-
 def test_a_hello_that_repeats_another_number_is_none_of_ours():
     requests = Requests(random.Random(1))
     requests.ask(0.0, 1.0)
@@ -189,18 +157,6 @@ def test_a_hello_that_repeats_another_number_is_none_of_ours():
     assert requests.answered == 0
 
 
-def test_an_overdue_request_is_sent_again_as_long_as_someone_waits():
-    requests = known()
-    requests.ask(10.0, 12.0)
-    first = requests.data_to_send()
-    requests.poll(10.4)
-    assert not requests.data_to_send()
-    requests.poll(10.6)
-    assert requests.data_to_send() not in (b"", first)
-    requests.poll(12.5)
-    assert not requests.data_to_send()
-
-
 def test_a_random_number_does_not_continue_what_was_sent_of_late():
     """Of two frames that waited in the board while the hello went ahead, one may carry an older number with the same
     lowest bits, and the other one the next of these."""
@@ -213,9 +169,3 @@ def test_a_random_number_does_not_continue_what_was_sent_of_late():
             after = lows[lows.index(low) :] if low in lows else []
             assert low % 7 + 1 not in after
             lows.append(low)
-
-
-def test_the_encoder_of_the_tests_agrees():
-    for number in (0x15A2D1, 0x4081, 0x1FFFFF):
-        for hello in (False, True):
-            assert request(number, hello) == protocol.encode_request(number, hello)

@@ -9,10 +9,8 @@ from world import Witness, World
 import contactfpga
 from contactfpga.driver.requests import Requests
 from contactfpga.wire import protocol
-from contactfpga_sim.model.board.virtual import VirtualBoard
 
 FAST = contactfpga.Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5, release_us=1.0)
-SMALL = contactfpga.Skin(rows=4, columns=4, baud=6_000_000)
 
 
 def test_boards_that_read_pulses_are_told_by_clock_and_baud_rate():
@@ -55,17 +53,3 @@ def test_a_frame_that_is_read_was_scanned_after_the_call(down_us):
         for _ in range(30):
             since = world.now_us
             witness.check(board.read(), since)
-
-
-@pytest.mark.campaign  # each has a board to compile
-@pytest.mark.parametrize("baud", [6_000_000, 4_000_000])
-def test_the_virtual_board_is_asked_at_two_and_three_clocks_a_bit(baud):
-    with contactfpga.open(VirtualBoard(SMALL.replace(baud=baud), "nothing")) as board:
-        assert board.hello.pulsed
-        assert board.clock() < 0.004, "both forms are sent, and the hello is not waited for"
-        for _ in range(30):
-            before = board.clock()
-            zones = board.read()
-            assert zones.time_us >= before * 1e6 - 1
-            assert board.clock() - before < 0.002
-        assert not board.stats.damaged

@@ -15,7 +15,6 @@ from contactfpga.driver import native
 from contactfpga.driver.native import Unsettled
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
-from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
@@ -292,26 +291,6 @@ def enlist(link, ask):
     return look
 
 
-def test_a_frame_that_was_asked_for_is_skipped_in_both(pairs):
-    pair = pairs()
-    board = ModelBoard(SKINS["moments"])
-    queues = [link.queue(100, False) for link in pair.links]
-    pair.take(board.hello() + board.frame() + board.frame())
-    looks = ask(pair, 10.0)
-    for _ in range(6):
-        for _, hello in board.hear(pair.sent()):
-            pair.take(board.hello() if hello else b"")
-        pair.take(board.frame())
-        pair.pass_time()
-    found = [look() for look in looks]
-    assert told(found[0]) == told(found[1]) != "None"
-    for queue, zones in zip(queues, found, strict=True):
-        queue.skip_to(zones)
-    rest = [[told(item) for item in iter(queue.pop, None)] for queue in queues]
-    assert rest[0] == rest[1]
-    assert 0 < len(rest[0]) < 8
-
-
 def test_what_the_ring_overwrites_counts_as_lost(pairs):
     """As if the line had lost it; the newest frame is always there."""
     pair, board = pairs(), ModelBoard(SKINS["moments"])
@@ -331,15 +310,3 @@ def test_what_the_ring_overwrites_counts_as_lost(pairs):
     left = list(iter(queue.pop, None))
     assert len(left) == stats.frames
     assert [zones.time_us for zones in left[-5000:]] == list(range(board.time_us - 5000 * 96, board.time_us, 96))
-
-
-def test_a_batch_is_the_same(pairs):
-    pair, board = pairs(), ModelBoard(SKINS["moments"])
-    queues = [link.queue(1000, False) for link in pair.links]
-    pair.take(board.hello() + b"".join(board.frame() for _ in range(50)))
-    pair.take(board.frame())
-    pair.pass_time()
-    batches = [Batch.of(queue.pop_frames()) for queue in queues]
-    for name in ("frames", "zones"):
-        assert repr(getattr(batches[0], name)) == repr(getattr(batches[1], name))
-    assert len(batches[0]) == 51

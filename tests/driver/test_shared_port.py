@@ -87,39 +87,37 @@ def opened(line, number, baud=3_000_000):
     return board
 
 
-def test_each_sheet_is_a_board_of_its_own(line):
-    with opened(line, 1) as back, opened(line, 0) as chest:
-        assert [board.name for board in (chest, back)] == ["chest", "back"]
-        assert [board.hello.place for board in (chest, back)] == [(0, 2), (1, 2)]
-        for _ in range(20):
-            for number, board in enumerate((chest, back)):
-                (zone,) = board.read()
-                assert zone.sum_x == 10 + number
-        assert [board.stats.lost + board.stats.damaged.total() for board in (chest, back)] == [0, 0]
-        assert [board.port for board in (chest, back)] == ["fake#0", "fake#1"]
-
-
 def test_threads_that_wait_for_their_sheets_all_get_their_frames(line):
+    """While another one opens and closes them."""
     boards = [opened(line, number) for number in (0, 1)]
-    found = [[], []]
-    threads = [
-        threading.Thread(target=lambda n=number: [found[n].append(boards[n].read(1e3)) for _ in range(30)])
-        for number in (0, 1)
-    ]
-    for thread in threads:
+    found, done = [[], []], threading.Event()
+
+    def follow(number):
+        found[number] += [boards[number].read(1e3)[0].sum_x for _ in range(30)]
+
+    def visit():
+        while not done.is_set():
+            sheets.share(SheetOf("fake", 1), 3_000_000).close()
+
+    threads = [threading.Thread(target=follow, args=(number,)) for number in (0, 1)]
+    visitor = threading.Thread(target=visit)
+    for thread in (*threads, visitor):
         thread.start()
     for thread in threads:
         thread.join()
-    assert [[zones[0].sum_x for zones in of_one] for of_one in found] == [[10] * 30, [11] * 30]
+    done.set()
+    visitor.join()
+    assert found == [[10] * 30, [11] * 30]
     for board in boards:
         board.close()
 
 
-def test_a_packet_that_lost_its_number_is_counted_by_all(line):
-    with opened(line, 0) as chest, opened(line, 1) as back:
-        line.out += b"\x05\x11\x22\x33\x44\x80\x80\x80\0"
-        assert [board.read()[0].sum_x for board in (chest, back)] == [10, 11]
-        assert [board.stats.damaged.total() for board in (chest, back)] == [1, 1]
+def test_noise_without_an_end_is_not_kept():
+    """A line at another baud rate may have no delimiter."""
+    sorter = sheets.Sorter()
+    for _ in range(10):
+        assert sorter.take(b"\xaa" * 30_000) == [(None, b"\x01\0")]
+        assert not sorter._rest
 
 
 def test_what_nobody_takes_is_dropped_by_whole_packets_and_counted(line, monkeypatch):
@@ -158,55 +156,6 @@ def test_a_board_of_several_sheets_names_their_ports(line, monkeypatch):
         contactfpga.open("fake")
 
 
-@pytest.mark.parametrize("place", [bytes([5, 2]), b"", None])
-def test_a_hello_that_cannot_be_is_counted_as_damaged_and_the_others_go_on(line, place):
-    """As of a board of another release, or of none."""
-    port = line.boards[1]
-    line.say(1, port.frame())
-    facts = port.wire.facts() | ({10: place} if place is not None else {5: b"short"})
-    line.say(1, DirectPort.hello(port, facts=facts))
-    with opened(line, 1) as back, opened(line, 0) as chest:
-        line.say(1, DirectPort.hello(port, facts=facts))
-        assert [board.read()[0].sum_x for board in (chest, back)] == [10, 11]
-        assert [board.stats.damaged.total() for board in (chest, back)] == [0, 2]
-
-
-def test_another_bitstream_at_an_open_port_has_other_sheets(line):
-    """Flashing need not close a port; who opens a sheet then is told what there is now."""
-    with opened(line, 0) as chest:
-        line.out += DirectPort(SKINS[0]).hello()
-        with pytest.raises(PortNotFound, match="one sheet, without a number"):
-            chest.read()
-        with opened(line, 1) as back:
-            assert back.read()[0].sum_x == 11
-            assert chest.read()[0].sum_x == 10
-            line.boards[1].place = bytes([1, 3])
-            line.say(1, line.boards[1].hello())
-            back.read()
-            with pytest.raises(contactfpga.ReadTimeout):
-                opened(line, 2)
-            line.boards[1].place = bytes([1, 2])
-            line.say(1, line.boards[1].hello())
-            back.read()
-            with pytest.raises(PortNotFound, match="fake#2: the board at fake has the sheets 0 to 1"):
-                opened(line, 2)
-
-
-def test_noise_without_an_end_is_noise_and_is_not_kept(line):
-    """A line at another baud rate may have no delimiter."""
-    line.write = lambda data: None
-    line.said_unasked = b"\xaa" * 30_000
-    line.read = lambda seconds, read=line.read: (read(seconds), setattr(line, "seconds", line.seconds + 0.01))[0]
-    with pytest.raises(contactfpga.OnlyNoise):
-        opened(line, 0)
-    port = Board(sheets.share(SheetOf("fake", 0), 3_000_000, lambda port, baud: line))
-    with pytest.raises(contactfpga.ReadTimeout):
-        port.read(1.0)
-    assert len(port._link.transport._shared._sorter._rest) < 100_000
-    port.close()
-    line.closed -= 1
-
-
 def test_another_baud_rate_at_an_open_port_is_refused(line):
     with opened(line, 0), pytest.raises(ContactFPGAError, match=r"fake#1: another sheet.*open at 3000000 baud"):
         opened(line, 1, baud=1_000_000)
@@ -243,8 +192,10 @@ def test_sheets_at_a_serial_port(capsys):
         port = os.ttyname(slave)
         with contactfpga.open(f"{port}#0", timeout=60) as chest, contactfpga.open(f"{port}#1", timeout=60) as back:
             for number, board in enumerate((chest, back)):
+                assert (board.port, board.name) == (f"{port}#{number}", SKINS[number].name)
+                assert board.hello.place == (number, 2)
                 assert board.read(60.0)[0].sum_x == 10 + number
-            assert not chest.stats.damaged
+                assert (board.stats.lost, board.stats.damaged.total()) == (0, 0)
         main(["doctor", f"{port}#1", "--timeout", "1", "--seconds", "0.1"])
         assert f"ok    {port} may be read and written" in capsys.readouterr().out
     finally:

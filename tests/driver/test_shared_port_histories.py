@@ -4,8 +4,6 @@ The oracle reads the line's bytes by docs/protocol.md, with another library and 
 """
 
 import random
-import threading
-import time
 
 import pytest
 from cobs import cobs
@@ -194,52 +192,3 @@ def test_each_sheet_gets_its_packets_and_no_others(seed):
     assert line.closed > 2
     assert compared > 100
     assert refused > 3
-
-
-def test_threads_that_read_open_and_close_get_theirs():
-    """Of a line that many read at once: those that stay get all, the others a stretch without a gap."""
-    rng = random.Random(1)
-    line, packets = Line(rng), []
-    line.heard = lambda data: time.sleep(0.0005)  # lest it ends before the others begin
-    for _ in range(3000):
-        number = rng.randrange(len(SKINS))
-        packet = numbered(line.boards[number].frame(), number)
-        packets.append((number, packet[:-1]))
-        line.out += packet
-    expected = [[wanted(packet, of) for of, packet in packets if of == number] for number in range(len(SKINS))]
-    stays = [sheets.share(SheetOf("fake", number), 3_000_000, lambda port, baud: line) for number in range(len(SKINS))]
-    found, stretches, failures = [[], [], []], [], []
-
-    def follow(number):
-        while len(found[number]) < len(expected[number]):
-            found[number].extend(items_in(stays[number].read(0.001), number))
-
-    def visit(number, seed):
-        order = random.Random(seed)
-        while line.out:
-            port = sheets.share(SheetOf("fake", number), 3_000_000, lambda port, baud: line)
-            items = [item for _ in range(order.randrange(20)) for item in items_in(port.read(0.001), number)]
-            port.close()
-            stretches.append((number, items))
-
-    def guarded(work, *arguments):
-        try:
-            work(*arguments)
-        except BaseException as error:
-            failures.append(error)
-
-    threads = [threading.Thread(target=guarded, args=(follow, number)) for number in range(len(SKINS))]
-    threads += [threading.Thread(target=guarded, args=(visit, seed % len(SKINS), seed)) for seed in range(6)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60)
-    for port in stays:
-        port.close()
-    assert failures == []
-    assert found == expected
-    assert any(items for _, items in stretches)
-    for number, items in stretches:
-        begin = expected[number].index(items[0]) if items else 0
-        assert items == expected[number][begin : begin + len(items)]
-    assert sheets._open == {}

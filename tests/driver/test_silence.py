@@ -109,13 +109,6 @@ def test_events_are_frames_faults_and_silence_in_order(board, port):
     assert board.events().next() == Faults(rows_open=(3,)), "faults that there are come first"
 
 
-def test_a_subscription_to_frames_gets_frames_alone(board, port):
-    frames = board.subscribe()
-    port.word = 1
-    port.out += port.report()
-    assert isinstance(frames.next(), contactfpga.Zones)
-
-
 def test_a_pulled_plug_is_no_silence(board, port):
     frames, events = board.subscribe(deadline_s=0.05), board.events(deadline_s=0.05)
     port.unplugged = True

@@ -111,25 +111,6 @@ def test_lost_sweeps_are_counted_and_times_wrap_with_those_of_frames():
     assert (stats.sweeps, stats.sweeps_lost, stats.sweeps_unexplained) == (2, 3, 0)
 
 
-def test_before_a_frame_the_time_of_a_sweep_is_not_known():
-    line = Line()
-    line.host = Conversation("x")
-    line.give(line.board.hello())
-    assert line.sweep(500, 1, 2) == []
-    assert line.host.stats.sweeps_unexplained == 1
-
-
-def test_a_restart_forgets_what_was_read():
-    line = Line()
-    line.sweep(150, 1, 1)
-    line.sweep(190, 1, 1)
-    zones = line.frame()
-    line.board.power_up()
-    line.give(line.board.hello(), line.board.frame())
-    assert line.host.units.history.count == 0
-    assert zones.units.readings == (1, 1) if zones.time_us < 190 else zones.units is None
-
-
 def test_a_board_without_units_has_none():
     line = Line(Skin())
     assert line.frame().units is None

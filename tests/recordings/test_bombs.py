@@ -170,8 +170,6 @@ def test_very_many_small_records_are_not_all_looked_at(tmp_path, use):
     "command",
     [
         ["record", "--recover", "X"],
-        ["export", "X", "o.csv"],
-        ["plot", "X"],
         ["zones", "--once", "replay://X"],
         ["view", "X"],
     ],

@@ -118,15 +118,6 @@ def test_a_table_of_no_known_kind(file, tmp_path, capsys, name, said):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_table_that_fails_leaves_the_old_one(file, tmp_path, monkeypatch, capsys):
-    (tmp_path / "x.csv").write_text("precious")
-    monkeypatch.setattr(csv, "writer", lambda file: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    assert cli.main(["export", str(file), str(tmp_path / "x.csv")]) == 1
-    assert "cannot be written: No space left" in capsys.readouterr().err
-    assert (tmp_path / "x.csv").read_text() == "precious"
-    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
-
-
 def test_without_pyarrow_the_extra_is_named(file, tmp_path, monkeypatch, capsys):
     import sys
 

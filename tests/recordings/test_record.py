@@ -1,10 +1,9 @@
 """What `contactfpga record` writes, replay and Recording read."""
 
-import itertools
 from types import SimpleNamespace
 
 import pytest
-from fake_board import FakeBoard, wait_until
+from fake_board import wait_until
 from recorded_stream import StreamPort, recorded, replayed
 
 import contactfpga
@@ -156,18 +155,6 @@ def test_the_command_says_what_it_wrote(board, tmp_path, capsys):
     assert Recording(file).duration_s >= 0
 
 
-def test_ctrl_c_is_the_usual_end(board, tmp_path, capsys, monkeypatch):
-    turns = itertools.count()
-
-    def wait(self, seconds):
-        if next(turns) == 3:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Session, "wait", wait)
-    assert run(tmp_path / "x.mcap", board.path, "--timeout", LONG) == 0
-    assert Recording(tmp_path / "x.mcap").links
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -190,19 +177,6 @@ def test_without_a_board_there_is_no_file(tmp_path, capsys):
     assert run(tmp_path / "x.mcap", tmp_path / "none") == 1
     assert "cannot be opened" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_port_that_is_lost_leaves_a_whole_file(tmp_path, capsys):
-    with FakeBoard(SKIN) as board:
-        board.send(board.frame())
-        session = Session(tmp_path / "x.mcap")
-        session.add(board.path, timeout=LONG)
-        session.start()
-        board.unplug()
-        wait_until(lambda: session.wait(0.005) or not session.running)
-        with pytest.raises(contactfpga.PortLost):
-            session.stop()
-    assert Recording(tmp_path / "x.mcap").links
 
 
 def test_bytes_that_wait_are_written_though_a_recording_is_played_slowly(tmp_path):

@@ -86,14 +86,3 @@ def test_a_file_of_that_name_goes_first(tmp_path):
     port = StreamPort(frames=100)
     recorded(tmp_path, port, bytes_only=True)
     assert b"".join(data for _, data in Recording(tmp_path / "touches.mcap").raw_bytes()) == port.sent
-
-
-@pytest.mark.slow
-def test_the_commands_take_the_name_too(tmp_path, capsys):
-    recorded(tmp_path, StreamPort(frames=2000), **SPLIT)
-    for command, out in (("export", ["x.csv"]), ("plot", ["--output", "x.svg"])):
-        arguments = [command, "touches.mcap", *out]
-        paths = [str(tmp_path / one) if "." in one else one for one in arguments]
-        assert cli.main(paths) == 0, capsys.readouterr().err
-    rows = (tmp_path / "x.csv").read_text().splitlines()
-    assert len(rows) == 1 + len(replayed(tmp_path / "touches.mcap"))

@@ -9,7 +9,7 @@ import pytest
 import ros_messages
 from fake_board import wait_until
 from net_processes import Streaming
-from recorded_stream import StreamPort, recorded, replayed
+from recorded_stream import replayed
 
 import contactfpga
 from contactfpga.driver.conversation import Conversation
@@ -94,19 +94,3 @@ def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed)
     assert session.links[0].notes == []
     assert len(messages(file)) > 1
     assert messages(file) == times_us(file)
-
-
-@pytest.mark.parametrize("seconds", [None, 0.1])
-def test_so_has_every_frame_of_a_recording_that_is_recorded_again(tmp_path, seconds):
-    first = recorded(tmp_path, StreamPort(frames=300), name="first.mcap")
-    assert first.links[0].notes == []
-    assert messages(tmp_path / "first.mcap") == times_us(tmp_path / "first.mcap")
-    with Session(tmp_path / "second.mcap") as session:
-        session.add(f"replay://{tmp_path / 'first.mcap'}")
-        session.start(seconds)
-        while session.running:
-            session.wait(0.05)
-    again = times_us(tmp_path / "second.mcap")
-    assert messages(tmp_path / "second.mcap") == again
-    assert again == times_us(tmp_path / "first.mcap")[: len(again)]
-    assert len(again) > 100

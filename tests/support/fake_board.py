@@ -13,7 +13,6 @@ import tty
 
 from model_board import ZONE as ZONE
 from model_board import ModelBoard
-from wire import old_frame, old_hello
 
 
 def wait_until(condition, seconds=60.0, pause_s=0.002):
@@ -60,12 +59,9 @@ class FakeBoard(ModelBoard):
     def __init__(self, skin, link=None):
         super().__init__(skin)
         self.answers = True
-        self.greets = True
-        self.old = False  # speaks protocol 1
         self.hello_s = 0.0  # says hello so often without being asked; 0: never
         self.stream = b""  # sent over and over, as fast as the port takes it; or a function that makes more
         self.slice = 1 << 16  # bytes written at once
-        self.delay_s = 0.0  # from a request to the answer
         self.asked = 0
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
@@ -101,11 +97,6 @@ class FakeBoard(ModelBoard):
         if not self._stop.is_set():
             self.unplug()
 
-    def _answer(self, asked_for_hello):
-        if self.old:
-            return old_hello() + old_frame()
-        return (self.hello() if self.greets and asked_for_hello else b"") + self.frame()
-
     def _write(self, data: bytes):
         while data and not self._stop.is_set():
             _, ready, _ = select.select([], [self._master], [], 0.05)
@@ -123,8 +114,7 @@ class FakeBoard(ModelBoard):
                 answers, heard = self.answers, self.hear(os.read(self._master, 100))
                 self.asked += len(heard)
                 if answers and heard:
-                    time.sleep(self.delay_s)
-                    self.send(self._answer(any(hello for _, hello in heard)))
+                    self.send((self.hello() if any(hello for _, hello in heard) else b"") + self.frame())
             elif self.stream:
                 _, writable, _ = select.select([], [self._master], [], 0.005)
                 if writable:

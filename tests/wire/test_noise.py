@@ -64,14 +64,6 @@ def lines(request, rng):
     return [Line(SKINS[request.param], rng) for _ in range(LINES)]
 
 
-def test_a_lost_byte_costs_its_frame_and_a_lost_delimiter_the_next_one_as_well(lines, record_property):
-    for line in lines:
-        for at in range(len(line.hit)):
-            delimiter = at == len(line.hit) - 1
-            assert line.lost(line.hit[:at] + line.hit[at + 1 :]) == ([HIT, HIT + 1] if delimiter else [HIT])
-    record_property("cases", sum(len(line.hit) for line in lines))
-
-
 def test_lost_runs_of_bytes_cost_no_frame_behind_the_next_one(lines, record_property):
     cases = 0
     for line in lines:
@@ -97,7 +89,7 @@ def test_a_wrong_byte_costs_its_frame_and_a_wrong_delimiter_the_next_one_as_well
     for line in lines[:1]:
         for at, byte in enumerate(line.hit):
             delimiter = at == len(line.hit) - 1
-            for wrong in sorted(set(range(256)) - {byte})[at % 3 :: 3]:  # a third each place, all values over some
+            for wrong in sorted(set(range(256)) - {byte})[at % 5 :: 5]:  # a fifth each place, all values over some
                 lost = line.lost(line.hit[:at] + bytes([wrong]) + line.hit[at + 1 :])
                 assert lost == ([HIT, HIT + 1] if delimiter else [HIT])
                 cases += 1
@@ -141,8 +133,8 @@ def passing(packets, table):
     return np.flatnonzero((packets[:, -3] == parts[0]) & (packets[:, -2] == parts[1]) & (packets[:, -1] == parts[2]))
 
 
-PACKETS = 10_000_000
-PER_LENGTH = 400_000
+PACKETS = 4_000_000
+PER_LENGTH = 160_000
 LENGTHS = range(5, 5 + PACKETS // PER_LENGTH)
 
 

@@ -72,7 +72,7 @@ def fields(frame):
 
 
 @given(st.data(), skins(), TRAILERS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_zones_arrive_exactly(data, skin, trailer):
     rows = data.draw(moments(skin))
     if sum(row[0] for row in rows) > skin.rows * skin.columns:
@@ -85,7 +85,7 @@ def test_zones_arrive_exactly(data, skin, trailer):
 
 
 @given(st.data(), skins(report="barycenter"), st.integers(0, 8), TRAILERS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
     skin = skin.replace(barycenter_bits=fraction_bits)
     x, y = (st.integers(0, (lines - 1) * 2**fraction_bits) for lines in (skin.columns, skin.rows))
@@ -126,7 +126,7 @@ NAMES = st.text(max_size=8).filter(lambda name: name.isprintable() and name == n
         | {"heard": st.integers(0, 2**21 - 1)}
     ),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_hellos_arrive(skin, send, pitch_y_mm, name, state):
     skin = skin.replace(pitch_y_mm=pitch_y_mm, name=name)
     if send == "on_change" and skin.rows < 60:
@@ -182,7 +182,7 @@ def test_a_hello_whose_middle_was_lost_is_refused_and_the_next_one_is_taken():
 
 
 @given(st.binary(max_size=700) | st.lists(st.sampled_from([b"\0", b"a" * 253, b"b" * 254, b"c"])).map(b"".join))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_stuffing_and_check_are_the_documented_ones(data):
     stuffed = protocol.cobs_encode(data)
     assert stuffed == cobs.encode(data)

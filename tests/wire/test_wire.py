@@ -127,7 +127,8 @@ def test_no_single_flip(name, packet, behind, record_property):
     record_property("cases", 8 * len(packet))
 
 
-def test_no_single_flip_in_long_frames(record_property):
+@pytest.mark.parametrize("step", sample([3, 1], quick=[3]))
+def test_no_single_flip_in_long_frames(step, record_property):
     """Frames with COBS blocks of 254 bytes, and with the most zones their Skin carries."""
     rng, cases = random.Random(5), 0
     for name, zones in (
@@ -137,9 +138,9 @@ def test_no_single_flip_in_long_frames(record_property):
         packet = Wire(SKINS[name]).zones(zones)
         sent = accepted(name, packet)
         assert len(sent) == 1
-        for bit in range(8 * len(packet) - 8):
+        for bit in range(0, 8 * len(packet) - 8, step):
             assert not accepted(name, flipped(packet, 1, bit)), f"{name}: bit {bit}"
-        cases += 8 * len(packet) - 8
+            cases += 1
     record_property("cases", cases)
 
 
