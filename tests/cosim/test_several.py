@@ -36,7 +36,6 @@ SMALL = Several(
         Skin(rows=3, columns=2, settle_us=3.0, report="cells", diodes="row2col", row_order=(2, 0, 1), **FAST),
     )
 )
-CYCLES = 7_500
 EXAMPLE = examples() / "two-sheets.toml"
 
 
