@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from amaranth.back import rtlil
 from fake_board import FakeBoard
 from recorded_frames import recorded
 from sample import sample
@@ -17,8 +16,6 @@ from zone_oracles import nearest, zones_by_scipy
 import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga.zones.zone import Zones
-from contactfpga_hdl.top import Top
 from contactfpga_sim.lab.chart import errors, speed
 from contactfpga_sim.model.board import replay
 from contactfpga_sim.model.golden import Timeline, predict, zones
@@ -190,17 +187,6 @@ def test_commands(scene, tmp_path, capsys):
     assert sorted((zone["area_cells"], zone["x_mm"], zone["y_mm"]) for zone in found) == wanted
 
 
-def test_the_array_has_no_sums_that_were_not_sent():
-    with FakeBoard(SHEET) as board:
-        board.moments = [(4, 40, 96), (1, 0, 0)]
-        with contactfpga.open(board.path, timeout=60.0) as opened:
-            zones = opened.next(60.0)
-    assert isinstance(zones, Zones)
-    assert "sum_x" not in zones.array.dtype.names
-    assert zones.array["x_mm"].tolist() == [0.0, 40 / 8 * 3.4]
-    assert zones.array["area_cells"].tolist() == [1, 4]
-
-
 # ---- time, bytes, netlists
 
 SKINS = {
@@ -239,33 +225,6 @@ def test_the_last_byte_is_never_later_than_with_exact_moments(name):
         sooner.append(before - after)
         assert after <= before
     assert max(sooner) > 10 * moments.derived.bit_clocks
-
-
-@pytest.mark.parametrize(("row", "added"), [(0, 0), (15, 9)])
-def test_the_clocks_that_division_adds_to_the_last_byte(row, added):
-    """Of one zone: none when later rows hide it, Q in the last row; a byte less is sent, which takes 40 clocks."""
-    cells = np.zeros((16, 16), bool)
-    cells[row, 5] = True
-    before, after = (speed.touch(Skin(report=report), cells, 0.4)[0] for report in ("moments", "barycenter"))
-    packed = 1 if row == 0 else 0
-    assert after - before in (added - 40, added - 40 - packed)
-
-
-def test_an_untouched_sheets_frames_are_not_later():
-    byte_cycles = [
-        [cycle for cycle, value in predict(Skin(report=report), Timeline([]), 12_000).bytes if value == 0]
-        for report in ("moments", "barycenter")
-    ]
-    assert byte_cycles[0] == byte_cycles[1]
-    assert len(byte_cycles[0]) > 5
-
-
-def test_only_boards_that_divide_have_a_divider():
-    small = Skin(rows=3, columns=5, settle_us=12.0)
-    for report, has in (("moments", False), ("cells", False), ("barycenter", True)):
-        text = rtlil.convert(Top(small.replace(report=report)))
-        assert ("divide" in text) == has
-        assert "backlog" in text, "where records or items wait"
 
 
 def test_rounding_is_charged_to_the_method_on_the_chart():

@@ -142,33 +142,7 @@ def test_the_chart_draws_it(tmp_path):
 
 @pytest.mark.slow
 def test_fit_tries_it(capsys):
-    asked = [
-        "fit",
-        "bumper",
-        "--labeller",
-        "toy_labeller:TOY",
-        "--labeller",
-        "single",
-        "--pitch-mm",
-        "20",
-        "--cover",
-        "bare",
-    ]
-    cli.main(
-        [
-            *asked,
-            "--scan",
-            "raster",
-            "--placements",
-            "8",
-            "--jobs",
-            "1",
-            "--miscounted",
-            "none",
-            "--missed",
-            "none",
-            "--json",
-        ]
-    )
+    asked = "fit bumper --labeller toy_labeller:TOY --labeller single --pitch-mm 20 --cover bare --scan raster"
+    cli.main(f"{asked} --placements 8 --jobs 1 --miscounted none --missed none --json".split())
     found = json.loads(capsys.readouterr().out)
     assert "toy_labeller:TOY" in json.dumps(found)

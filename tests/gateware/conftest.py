@@ -5,14 +5,15 @@ import pytest
 
 @pytest.fixture(scope="module")
 def benches():
-    """Compiled labellers: ``benches(rows, columns, connectivity, labeller)``."""
-    from contactfpga.skin import Skin
+    """Compiled labellers: ``benches(rows, columns, connectivity, labeller, closed)``."""
+    from zone_oracles import skin_of
+
     from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
     built = {}
 
-    def bench(rows, columns, connectivity, labeller):
-        skin = Skin(rows=rows, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=20.0)
+    def bench(*facts):
+        skin = skin_of(*facts)
         if skin not in built:
             built[skin] = LabelBench(skin)
         return built[skin]

@@ -157,17 +157,6 @@ def test_one_wrong_record_is_flagged_in_its_frame_and_in_no_other(bench, rng):
     assert not any(flags[1::2])
 
 
-def test_a_cell_that_the_records_lack_is_flagged(bench, rng):
-    sheet = (3, 4)
-    frame = [0b0110, 0b0000, 0b1001]
-    records = [zones_of(frame)] * 13
-    frames = [frame] + [
-        [w ^ (1 << x if r == y else 0) for r, w in enumerate(frame)] for y in range(3) for x in range(4)
-    ]
-    _, _, summaries = run(bench, Audit(skin_of(*sheet)), schedule(rng, frames, records, sheet), sheet, rng)
-    assert [summary["mismatch"] for summary in summaries] == [0] + [1] * 12
-
-
 @pytest.mark.parametrize("capacity", [1, 3, 8, 10])
 def test_zones_beyond_the_capacity_are_counted_and_flagged_but_not_carried(bench, rng, capacity):
     sheet = (4, 5)

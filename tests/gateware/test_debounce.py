@@ -85,12 +85,6 @@ def frames_through(bench, facts, frames, **stalls):
     return [words[start : start + rows] for start in range(0, len(words), rows)], source, sink
 
 
-def single(bench, method, press, release, samples):
-    """The samples of one switch, debounced."""
-    frames, _, _ = frames_through(bench, (1, 1, method, press, release), [[sample] for sample in samples])
-    return [frame[0] for frame in frames]
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("sheet", SHEETS)
 def test_every_switch_follows_the_rule_whatever_the_others_do(bench, rng, method, sheet):
@@ -103,58 +97,6 @@ def test_every_switch_follows_the_rule_whatever_the_others_do(bench, rng, method
         got, _, _ = frames_through(bench, (*sheet, method, press, release), frames, rng=rng, gap=0.3, stall=0.3)
         for (r, c), states in wanted.items():
             assert [frame[r] >> c & 1 for frame in got] == states, f"switch {r}, {c} at {press}, {release}"
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("press", "release"), DELAYS)
-def test_one_switch_over_a_long_time(bench, rng, method, press, release):
-    samples = bouncing(rng, 400)
-    states = single(bench, method, press, release, samples)
-    assert states == debounced(method, press, release, samples)
-    assert set(states) == {0, 1}
-
-
-@pytest.mark.parametrize(("press", "release"), DELAYS)
-def test_symmetric_a_press_counts_after_its_time_and_so_does_a_release(bench, press, release):
-    for longer in (0, 1):
-        samples = [0] * 3 + [1] * (press + longer) + [0] * 12
-        states = single(bench, "sym_defer_pk", press, release, samples)
-        if longer:
-            assert states == [0] * (3 + press) + [1] * (release + 1) + [0] * (12 - release)
-        else:
-            assert states == [0] * len(samples)
-
-
-def test_symmetric_a_gap_of_one_sample_starts_the_time_again(bench):
-    samples = ([1] * 5 + [0]) * 4 + [1] * 6
-    assert single(bench, "sym_defer_pk", 5, 5, samples) == [0] * (len(samples) - 1) + [1]
-    held = [1] * 6 + ([0] * 5 + [1]) * 4 + [0] * 6
-    assert single(bench, "sym_defer_pk", 5, 5, held) == [0] * 5 + [1] * (len(held) - 6) + [0]
-
-
-@pytest.mark.parametrize(("press", "release"), DELAYS)
-def test_eager_a_press_counts_at_once_and_holds_for_its_time(bench, press, release):
-    samples = [0, 0, 1] + [0] * 25
-    held = 1 + max(0, press - 1) + release
-    states = single(bench, "asym_eager_defer_pk", press, release, samples)
-    assert states == [0, 0] + [1] * held + [0] * (26 - held)
-
-
-def test_eager_a_release_that_bounces_counts_from_its_last_press(bench):
-    samples = [1] * 6 + [0, 0, 1] * 3 + [0] * 8
-    assert single(bench, "asym_eager_defer_pk", 4, 2, samples) == [1] * 17 + [0] * 6
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_switch_that_bounces_changes_no_other(bench, rng, method):
-    facts = (3, 5, method, 2, 2)
-    steady = [[0b01010, 0b10101, 0b00110] for _ in range(40)]
-    still, _, _ = frames_through(bench, facts, steady)
-    for row, column in itertools.product(range(3), range(5)):
-        noisy = [[word ^ (rng.randrange(2) << column if r == row else 0) for r, word in enumerate(f)] for f in steady]
-        got, _, _ = frames_through(bench, facts, noisy)
-        others = [[word & ~(1 << column if r == row else 0) for r, word in enumerate(frame)] for frame in got]
-        assert others == [[w & ~(1 << column if r == row else 0) for r, w in enumerate(frame)] for frame in still]
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -31,15 +31,6 @@ def test_the_frame_on_the_page_is_wrong_in_the_model_and_right_in_ours(name):
     assert measure_inexact.exact(cells[None]) == [right]
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_models_are_right_where_their_fault_is_not(name):
-    """A lone cell, a solid square and a comb whose teeth do not meet."""
-    teeth = np.zeros((6, 5), bool)
-    teeth[:, ::2] = True
-    for cells in (np.eye(1, dtype=bool), np.ones((5, 5), bool), teeth):
-        assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
-
-
 @pytest.mark.parametrize(("name", "smaller"), [("detectinator", 6), ("ObNoDog", 7)])
 def test_no_smaller_frame_is_wrong(name, smaller):
     """Of sheets with fewer cells, and of the sheets with as many that come before it."""
@@ -50,13 +41,6 @@ def test_no_smaller_frame_is_wrong(name, smaller):
             for number in range(1 << len(places)):
                 cells = (number >> places & 1).astype(bool).reshape(rows, columns)
                 assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
-
-
-def test_one_cell_or_line_less_is_right():
-    lone, solid = drawn("High Throughput CLE"), drawn("CLE of the CVSD course")
-    lone[-1, -1] = False
-    for name, cells in (("High Throughput CLE", lone), ("CLE of the CVSD course", solid[1:])):
-        assert sorted(MODELS[name](cells)) == zones_by_scipy(cells)
 
 
 def test_the_search_finds_the_frame_of_the_page():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sample import sample
-from zone_oracles import cells_of, moments, zones_by_image_tools
+from zone_oracles import zones_by_image_tools
 
 from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.scenes import shapes
@@ -60,32 +60,3 @@ def test_stalls_change_no_zone(benches, labeller, size, gap, stall):
     free, stalled = bench.run(frames), bench.run(frames, gap=gap, stall=stall, seed=gap + stall)
     assert np.array_equal(stalled.frame, free.frame)
     assert np.array_equal(stalled.moments, free.moments)
-
-
-@pytest.mark.parametrize("labeller", LABELLERS)
-def test_no_cell_is_lost(benches, labeller):
-    frames = frames_of(9, 12)
-    got = benches(9, 12, 8, labeller).run(frames)
-    sums = np.zeros((len(frames), 3), int)
-    np.add.at(sums, got.frame, got.moments)
-    assert sums.tolist() == [list(moments(cells)) for cells in frames]
-
-
-@pytest.mark.parametrize(
-    ("picture", "zones"),
-    [
-        ("#... .... ...#", 2),  # a free row between
-        ("#..# .... ....", 2),  # a free column between
-        ("#... .#.. ..#. ...#", 1),
-        ("##.. ##.. ...# ...#", 2),  # one band, a free column
-        ("#... #.#. #... ####", 1),  # an L around a finger: two for those who look
-        ("#### #..# #..# ####", 1),
-        ("##.. ..## .... #..#", 3),  # slanted outlines, then two more
-        ("#..# .##. .... ....", 1),
-    ],
-)
-def test_what_shadows_join(benches, picture, zones):
-    cells = cells_of(picture)
-    frame = np.zeros((4, 4), bool)
-    frame[: len(cells)] = cells
-    assert len(benches(4, 4, 8, "projection").run(frame[None]).moments) == zones

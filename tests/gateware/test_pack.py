@@ -166,10 +166,15 @@ def test_frames_are_byte_exact_also_between_frames_that_are_not_sent(bench, rng,
     for zeros in (0.0, 0.05, 0.5, 0.95, 1.0, 0.3):
         items = random_items(rng, size, rng.randrange(min(60, most_items(skin) + 1)), zeros)
         frames.append(Frame(items, random_trailer(rng, skin), send=rng.random() < 0.7))
+    for count, send in ((0, False), (64, True), (64, False)):
+        items = random_items(rng, size, min(count, most_items(skin)), 0.1)
+        frames.append(Frame(items, random_trailer(rng, skin), send))
     frames.append(Frame([], random_trailer(rng, skin)))
     frames.append(Frame([bytes(size)], dict.fromkeys(frames[0].trailer, 0)))
-    got, _, verdicts = run(bench, skin, frames, rng, gap)
+    got, source, verdicts = run(bench, skin, frames, rng, gap)
     assert [written for _, written in got] == wanted(skin, frames, verdicts)
+    if not gap:
+        assert_clocks(skin, frames, verdicts, got, source)
 
 
 def test_stuffing_of_the_oracle_is_the_published_one():
@@ -229,16 +234,3 @@ def assert_clocks(skin, frames, verdicts, got, source):
         waits.append(ready)
     assert source.transfers == taken
     assert [cycle + 1 for cycle, _ in got] == waits
-
-
-@pytest.mark.parametrize("name", SKINS)
-def test_every_part_takes_its_clocks(bench, rng, name):
-    skin = skin_of(name)
-    size = sizes(skin)[0]
-    frames = [
-        Frame(random_items(rng, size, min(count, most_items(skin)), 0.1), random_trailer(rng, skin), send)
-        for count, send in ((0, True), (1, True), (3, False), (0, False), (2, True), (64, True), (64, False), (7, True))
-    ]
-    got, source, verdicts = run(bench, skin, frames, rng)
-    assert [written for _, written in got] == wanted(skin, frames, verdicts)
-    assert_clocks(skin, frames, verdicts, got, source)

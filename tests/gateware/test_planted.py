@@ -154,17 +154,3 @@ def test_text_that_is_not_there_once_cannot_be_replaced():
         planted.replaced("link/alive.py", "no such text", "")
     with pytest.raises(ValueError, match="not once: self"):
         planted.replaced("link/alive.py", "self", "")
-
-
-@pytest.mark.slow
-def test_a_copy_is_what_is_tested():
-    """Of a test that needs no gateware but for its import."""
-    test = [f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick"]
-    with planted.planted({}) as root:
-        assert planted.notice(root, test, 250)[0] is False
-    with planted.planted({"link/alive.py": "raise ValueError('planted')"}) as root:
-        noticed, said = planted.notice(root, test, 250)
-        assert noticed
-        assert "planted" in said
-        with pytest.raises(RuntimeError, match="status 4"):
-            planted.notice(root, ["tests/gateware/test_no_such_file.py"], 250)

@@ -136,15 +136,6 @@ def test_no_single_wrong_pulse_makes_another_request(read):
     assert count == 6 * len(SYMBOLS) - len(SYMBOLS)
 
 
-def test_no_change_within_sixteen_pulses_makes_another_request(read, rng):
-    """From each of them on, as many others, more or fewer in their place."""
-    symbols = []
-    for start, length in itertools.product(range(len(SYMBOLS)), (3, 16)):
-        other = [rng.choice([ONE, ZERO, MARK]) for _ in range(rng.choice([length, length, rng.randrange(17)]))]
-        symbols += [*SYMBOLS[:start], *other, *SYMBOLS[start + length :], ONE, MARK]
-    assert set(read(symbols)) <= {SENT}
-
-
 def test_a_request_in_the_other_form_is_none(listen, rng):
     """Hosts that do not know the board send both, the pulses first; neither board takes the other's."""
     for number in (1, 0x15A2D1, 0x1FFFFF):

@@ -1,4 +1,4 @@
-"""Line reversal with guard lines: each break is told and nothing else, when touches are seen, and motion in a frame."""
+"""Line reversal with guard lines: each break is told and nothing else, and when touches are seen."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,6 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, driven, predict
 from contactfpga_sim.model.golden import reversal_lines as golden_guard
 from contactfpga_sim.model.golden.facts import facts
@@ -32,9 +31,6 @@ class Life:
     words: list[int]
     """What is told: rows lowest, then columns, then stuck columns."""
     contact: list[int]
-    motion: list[int]
-    driven: list[tuple[int, int, int]]
-    """Rows that are driven, columns that are, and the level of the columns."""
     packed: list[int]
     """Cycles in which a frame was packed."""
 
@@ -43,12 +39,11 @@ def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
     """A scanner whose rows are taken at once; a frame is packed two clocks after its last row."""
     dut = ReversalScanner(skin)
     sim, sheet = bench(dut), InputDriver(skin, timeline)
-    sink, packed, driven = sim.sink(dut.rows), [], []
+    sink, packed = sim.sink(dut.rows), []
     ports = [getattr(dut.pins, name) for name in sheet.reads]
 
     def levels(cycle: int, pins: int) -> int:
         named = dict(zip(sheet.reads, split(pins, map(len, ports)), strict=True))
-        driven.append((named["rows_drive"], named["columns_drive"], named["columns_level"]))
         columns, rows, _ = sheet.pins(cycle, named)
         return columns | rows << skin.column_lines
 
@@ -59,9 +54,9 @@ def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
 
     sim.drive(Cat(dut.pins.columns, dut.pins.rows_read), levels, Cat(*ports))
     sim.drive(dut.packed, is_packed)
-    words, contact, motion = sim.watch(dut.faults), sim.watch(dut.contact), sim.watch(dut.tag.motion)
+    words, contact = sim.watch(dut.faults), sim.watch(dut.contact)
     sim.run(cycles)
-    return Life(words.values, contact.values, motion.values, driven, packed)
+    return Life(words.values, contact.values, packed)
 
 
 def cut_now_and_then(skin: Skin, rng, cycles: int) -> list[tuple[int, Cuts]]:
@@ -88,6 +83,7 @@ LOCKSTEP = [
     {"rows": 3, "columns": 4, "alive": True, "fail_safe": True, "mask": ((1, 1),)},
     {"rows": 4, "columns": 2, "report": "cells", "diodes": "row2col", "send": "always", "fail_safe": True},
     {"rows": 2, "columns": 3, "debounce": "sym_defer_pk", "debounce_press_us": 7.0, "debounce_release_us": 12.0},
+    {"rows": 3, "columns": 3, "mask": ((0, 0), (0, 1), (0, 2), (1, 2), (2, 2))},
 ]
 
 
@@ -124,17 +120,6 @@ def test_the_compiled_board_of_the_reference_sheet_is_the_golden_models_in_every
     skin, cycles = FAST.replace(guard=True), 60_000
     timeline = any_life(rng, skin, cycles)
     assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 1000
-
-
-def test_frames_come_between_reports_of_faults_and_tell_of_both():
-    skin, every, nothing = small(guard=True), np.ones((3, 4), bool), np.zeros((3, 4), bool)
-    pieces = []
-    for start in range(9000, 14_000, 500):
-        pieces += [(start, every, None), (start + 12, every & [[1], [0], [0]], None), (start + 250, nothing, None)]
-    trace = predict(skin, Timeline(pieces, cuts=[(0, Cuts({1: 4}))]), 16_000)
-    flags = [one.frame.flags for one in frames_in(skin, trace.bytes)]
-    assert {"fault", "motion"} in flags
-    assert flags[0] == frozenset()
 
 
 def in_turn(rng, spacing: int, lasts: int) -> tuple[list[int], list[tuple[int, Cuts]]]:
@@ -189,37 +174,6 @@ def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, soon, rng):
     assert set(live(bench, skin, Timeline(pieces), 60 * 64 + 1500).words) == {0}
 
 
-def test_lines_that_are_masked_whole_are_not_checked(bench, soon):
-    skin = small(rows=3, columns=3, project_us=2.0, mask=((0, 0), (0, 1), (0, 2), (1, 2), (2, 2)), **SLOW)
-    cuts = [(0, Cuts({0: 0}, {2: 0}))]
-    assert set(live(bench, skin, Timeline([], cuts=cuts), 600).words) == {0}
-
-
-def test_a_guard_column_that_is_stuck_is_told_alone_and_driven_no_more_until_the_next_turn(bench, soon):
-    """It says nothing about rows, then; columns are checked on."""
-    skin = small(rows=2, columns=2, project_us=2.0, **SLOW)
-    stuck, cells = np.array([False, False, True]), np.zeros((2, 2), bool)
-    cuts = [(130, Cuts({}, {1: 0}))]
-    life = live(bench, skin, Timeline([(40, cells, stuck), (300, cells, None)], cuts=cuts), 1200)
-    column_1, guard = 1 << 2 + 1, 1 << 4 + 2
-    assert set(life.words) == {0, guard, guard | column_1, column_1}
-    told = life.words.index(guard)
-    assert told < 40 + 3 * 32
-    assert not any(columns >> 2 for _, columns, _ in life.driven[told + 1 : 256])
-    assert any(columns >> 2 for _, columns, _ in life.driven[258:300]), "retried"
-    assert life.words[-1] == column_1
-
-
-def test_a_column_that_is_stuck_is_told_alone_until_a_retry_finds_it_free(bench, soon):
-    skin = small(rows=2, columns=2, project_us=2.0, **SLOW)
-    nothing, stuck = np.zeros((2, 2), bool), np.array([True, False, False])
-    life = live(bench, skin, Timeline([(40, nothing, stuck), (300, nothing, None)]), 1200)
-    assert set(life.words) == {0, 1 << 4}
-    assert life.words.index(1 << 4) < 40 + 3 * 32
-    assert life.words[300]
-    assert not life.words[-1]
-
-
 @pytest.mark.parametrize(("project_us", "clocks"), [(1.0, 43), (0.7, 36)])
 def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project_us, clocks):
     """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7
@@ -236,25 +190,3 @@ def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project
     settle, project = facts(skin).settle, facts(skin).project
     assert min(late) == 3
     assert settle + project + 3 <= max(late) <= settle + project + 7 == clocks
-
-
-def test_a_row_that_is_empty_when_it_is_driven_is_told_as_motion(bench):
-    """Its touch was there as the frame began. What only a debounce time keeps is no motion."""
-    skin = small(rows=3, columns=3, project_us=2.0, mask=((2, 0),), **SLOW)
-    every, nothing = np.ones((3, 3), bool), np.zeros((3, 3), bool)
-    top, last = every & [[1], [0], [0]], every & [[0], [0], [1]]
-    held = [(40, every, None)]
-    assert not any(live(bench, skin, Timeline(held), 200).motion)
-    begun = 40 + 2 + facts(skin).project
-    moved = live(bench, skin, Timeline([*held, (begun + 8, top, None)]), 200)
-    assert moved.motion.index(1) > begun
-    frame = next(cycle for cycle in moved.packed if cycle > begun)
-    assert moved.motion[frame] == 1
-    assert moved.motion[-1] == 0, "the next frame is not"
-    masked = [(40, last, None), (begun + 1, nothing, None)]
-    assert not any(live(bench, skin, Timeline(masked), 200).motion), "a masked switch may have been the one"
-    slow = skin.replace(debounce="sym_defer_pk", debounce_release_us=50.0)
-    assert not any(live(bench, slow, Timeline(masked), 200).motion), "with debounce, too"
-    slow = slow.replace(mask=())
-    kept = live(bench, slow, Timeline([(40, top, None), (90, nothing, None)]), 200)
-    assert sum(kept.motion) <= 2 * facts(slow).row_clocks + 20

@@ -294,14 +294,6 @@ def test_a_column_that_reads_pressed_for_up_to_eight_clocks_is_driven_on(rng, cl
     assert not any(life.stuck)
 
 
-def test_a_column_that_is_stuck_costs_the_switches_in_it_and_no_others():
-    """While it is stuck its own switches read pressed in every row that is driven."""
-    skin = small(rows=3, columns=2, release_us=1.0, **SLOW)
-    life = live(skin, lambda cycle: State([0, 0b11, 0], 0b01), 500)
-    assert {slot.row for slot in life.slots} == {1}
-    assert all(row[2] == (0b11 if row[1] == 1 else 0b01) for row in life.taken if row[0] > 20 and row[2])
-
-
 def test_a_touch_of_a_column_that_was_let_go_is_seen_when_it_is_tried(soon):
     """The pressed switch pulls it to its row's level meanwhile, as if it were still stuck."""
     skin = small(rows=2, columns=2, release_us=1.0, **SLOW)

@@ -10,7 +10,6 @@ from contactfpga import Skin
 from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.scan import raster, reversal
 from contactfpga_sim.model.golden import Timeline, guard, predict
-from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
 from contactfpga_sim.verify.cosim.compare import compare
@@ -71,31 +70,6 @@ def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 20
     assert expected.alive
-
-
-@pytest.mark.slow
-def test_alive_turns_every_ms_while_all_is_well_and_whatever_is_pressed():
-    touches = Timeline([(100, ~NOTHING, None), (2_500, NOTHING, None)])
-    trace = bench_native.run(GUARDED, touches, 5_002)
-    assert trace.alive == [(1000, 1), (2000, 0), (3000, 1), (4000, 0), (5000, 1)]
-
-
-@pytest.mark.slow
-def test_alive_rests_and_contact_is_high_until_what_was_told_is_renewed():
-    scan, renewed, end = facts(GUARDED).scan_clocks, 2**16, 70_002
-    trace = bench_native.run(GUARDED, Timeline([], cuts=[(1_200, Cuts({1: 2})), (3_100, Cuts())]), end)
-    (rises, _), (falls, _) = trace.contact
-    assert 1_200 < rises <= 1_200 + scan + 4
-    assert renewed < falls <= renewed + 2 * scan + 4
-    ticks = [cycle for cycle, _ in trace.alive]
-    assert ticks == [1000, *range((falls + scan) // 1000 * 1000 + 1000, end, 1000)]
-
-
-@pytest.mark.slow
-def test_without_fail_safe_a_fault_leaves_contact_low():
-    skin, cut = GUARDED.replace(fail_safe=False), Timeline([], cuts=[(100, Cuts({}, {0: 0}))])
-    trace = bench_amaranth.run(skin, cut, 1_500)
-    assert (trace.contact, trace.alive) == ([], [])
 
 
 def test_alive_turns_where_all_was_well_since_the_last_tick(bench, rng):

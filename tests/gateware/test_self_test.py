@@ -157,13 +157,6 @@ def test_a_whole_sheet_says_nothing_but_what_is_pressed(bench, rng):
         assert test.pressed == {(row, column) for row, column in np.argwhere(cells).tolist() if column}
 
 
-def test_a_bridged_diode_is_not_told_while_nobody_presses(bench):
-    test, bit = self_test(
-        bench, small(rows=2, columns=2, self_test=True), np.zeros((2, 2), bool), Shorts(bridged=((1, 0),))
-    )
-    assert (test.findings, bit) == ((), 0)
-
-
 def test_diodes_of_guard_switches_are_named(bench):
     skin, nothing = small(rows=3, columns=3, self_test=True, guard=True), np.zeros((3, 3), bool)
     for line in range(3):
@@ -182,13 +175,6 @@ def test_a_column_with_a_strong_pull_is_not_judged_and_the_others_are(bench):
     assert bit == 1
     test, bit = self_test(bench, skin, nothing, Shorts(pulled=(1,), columns=((0, 1),)))
     assert (test.faults, bit) == (("column 0 follows column 1",), 1)
-
-
-def test_a_column_at_the_selecting_level_does_not_rise(bench):
-    skin = small(rows=2, columns=2, self_test=True)
-    test, bit = self_test(bench, skin, np.eye(2, dtype=bool), Shorts(), np.array([False, True]))
-    assert (test.faults, bit) == (("column 1 is held at the selecting level",), 0)
-    assert test.pressed == {(0, 0)}
 
 
 def test_the_first_frame_comes_after_the_self_test_in_the_stated_time():

@@ -3,22 +3,17 @@
 import dataclasses
 import itertools
 import math
-import random
 
-import numpy as np
 import pytest
 from amaranth.hdl import Cat
 from bench import split
 from sample import sample
 
 from contactfpga import Skin
-from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.model.golden import Timeline, predict
-from contactfpga_sim.model.golden.facts import facts
-from contactfpga_sim.model.golden.raster import scans
-from contactfpga_sim.model.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, SheetAtPins
+from contactfpga_sim.model.golden import predict
+from contactfpga_sim.model.sheet.shift import COLUMN_PINS, ROW_PINS, SheetAtPins
 from contactfpga_sim.verify.cosim import bench_native
 from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.covering import stimulus
@@ -71,11 +66,10 @@ class Run:
 
     driven: list  # rows that are selected
     rows: list  # (cycle, cells) of each transfer
-    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested, heard), there one clock later
     pins: dict  # levels of each of its output pins
 
 
-def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, disturb=lambda cycle, sheet: None):
+def run(bench, skin, cells, sheet=None):
     """Run the scanner in a sheet with ``cells[cycle]`` pressed, R words each."""
     dut = Scanner(skin)
     sim = bench(dut)
@@ -89,28 +83,17 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
         pins = dict(zip(sheet.reads, split(word, map(len, ports)), strict=True))
         for name, value in pins.items():
             seen[name].append(value)
-        disturb(cycle, sheet)
-        columns = np.array([stuck(cycle) >> column & 1 for column in range(skin.columns)], bool)
-        sheet.matrix.press(cells[min(cycle, len(cells) - 1)], columns)
+        sheet.matrix.press(cells[min(cycle, len(cells) - 1)])
         (level,) = sheet.step(pins)
         driven.append([row for row in range(skin.rows) if (sheet.row_levels ^ idle) >> row & 1])
         return level
 
     (drives,) = sheet.drives
     sim.drive(getattr(dut.pins, drives), levels, Cat(ports))
-    sim.drive(dut.request, lambda cycle: int(cycle in requests))
-    sim.drive(dut.heard, lambda cycle: 5 * any(at < cycle for at in requests))
     rows = sim.sink(dut.rows)
-    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested", "heard")]
     sim.run(len(cells))
-    lasts = [cycle for cycle, payload in rows.transfers if payload >> skin.columns]
     mask = (1 << skin.columns) - 1
-    return Run(
-        driven[: len(cells)],
-        [(cycle, payload & mask) for cycle, payload in rows.transfers],
-        {cycle: tuple(watch[cycle + 1] for watch in tag) for cycle in lasts if cycle + 1 < len(tag[0].values)},
-        seen,
-    )
+    return Run(driven[: len(cells)], [(cycle, payload & mask) for cycle, payload in rows.transfers], seen)
 
 
 def expected_driven(skin, cycles):
@@ -268,115 +251,6 @@ def test_power_up_contents_never_reach_the_sheet(bench, power_up):
     assert got.driven == expected_driven(skin, len(full))
     assert got.driven[: times(skin).first] == [[]] * times(skin).first
     assert got.rows == expected_rows(skin, full)
-
-
-def test_a_disturbed_register_is_right_again_with_the_next_row(bench):
-    skin = skin_of(rows=(9, 1), settle_us=3.0, release_us=0.5)
-    t = times(skin)
-    at = t.first + 4 * t.slot + 5
-
-    def disturb(cycle, sheet):
-        if cycle == at:
-            sheet.row_registers.shifted = [0]
-            sheet.row_registers.latched = [0b100001010 ^ 511]
-
-    cells = [[15] * 9] * slots(skin, 12)
-    wanted = expected_driven(skin, len(cells))
-    got = run(bench, skin, cells, disturb=disturb).driven
-    ends = t.first + 4 * t.slot + t.settle
-    assert got[at:ends] == [[1, 3, 8]] * (ends - at)
-    assert got[:at] + got[ends:] == wanted[:at] + wanted[ends:]
-
-
-# ---- what a frame says
-
-
-def test_stuck_columns_are_read_in_the_last_released_clock(bench):
-    skin = skin_of((2, 1), (9, 1), settle_us=4.0, release_us=1.0)
-    t = times(skin)
-    cells = [[0, 0]] * slots(skin, 8)
-    for late in (-1, 0, 1):
-        last_released = t.first + 3 * t.slot - 1  # of slot 2: told by frame 1, which ends with slot 3
-        got = run(bench, skin, cells, stuck=lambda cycle, at=last_released + late: 0b101 * (cycle == at))
-        assert [tag[1] for tag in got.tags.values()] == [0, 2 * (late == 0), 0, 0]
-
-
-def test_time_is_that_of_the_sample_however_long_the_shift():
-    direct, chained = (
-        skin_of(3, 40, settle_us=10.0, release_us=8.0),
-        skin_of(3, (40, 1), settle_us=10.0, release_us=8.0),
-    )
-    assert times(direct).slot == times(chained).slot
-    frames = [predicted_times(skin) for skin in (direct, chained)]
-    assert frames[0] == frames[1]
-    assert len(frames[0]) > 3
-
-
-def predicted_times(skin):
-    return [scan.time_us for scan in scans(facts(skin), Timeline([]), [], 5)]
-
-
-@pytest.mark.parametrize("report", ["moments", "cells"])
-def test_a_request_while_columns_are_loaded_or_shifted_asks_for_the_next_frame(bench, report):
-    """Where a command may move the sample, also one in the slot."""
-    skin = skin_of((2, 1), (9, 1), settle_us=4.0, release_us=1.0, report=report)
-    t = times(skin)
-    cells = [[0, 0]] * slots(skin, 8)
-    load = t.first + 2 * t.slot + (0 if report == "cells" else t.settle - 1 - t.bit)  # of frame 1
-    strobe = load + t.bit + 2 + t.late
-    for at, frame in ((load - 1, 1), (load, 2), (load + 1, 2), (strobe - 1, 2), (strobe, 2), (strobe + 1, 2)):
-        tags = run(bench, skin, cells, requests={at}).tags
-        assert [tag[2] for tag in tags.values()] == [int(index == frame) for index in range(4)], at
-        assert [tag[3] for tag in tags.values()] == [5 * (index >= frame) for index in range(4)], at
-        assert [tag[0] for tag in tags.values()] == [
-            (t.first + 2 * index * t.slot + t.settle + 1) // 12 for index in range(4)
-        ]
-
-
-# ---- wrong wiring and wrong gateware are seen
-
-
-class SwappedChains(RowRegisters):
-    def step(self, data, *pins):
-        return super().step((data & 1) << 1 | data >> 1, *pins)
-
-
-class ReversedRows(RowRegisters):
-    def step(self, *pins):
-        levels = super().step(*pins)
-        return levels if levels is None else int(f"{levels:010b}"[::-1], 2)
-
-
-class ReversedColumns(ColumnRegisters):
-    def step(self, load_n, clock, columns):
-        return super().step(load_n, clock, int(f"{columns:010b}"[::-1], 2))
-
-
-class SwappedPins(ColumnRegisters):
-    def step(self, load_n, clock, columns):
-        return super().step(clock, load_n, columns)
-
-
-@pytest.mark.parametrize("wrong", [SwappedChains, ReversedRows, ReversedColumns, SwappedPins])
-def test_wrong_wiring_is_seen(bench, rng, wrong):
-    skin = skin_of((10, 2), (10, 2))
-    cells = changing(rng, skin, slots(skin, 12))
-    assert run(bench, skin, cells).rows == expected_rows(skin, cells)
-    sheet = SheetAtPins(skin)
-    registers = "row_registers" if issubclass(wrong, RowRegisters) else "column_registers"
-    setattr(sheet, registers, wrong(10, 2, random.Random(0)))
-    assert run(bench, skin, cells, sheet).rows != expected_rows(skin, cells)
-
-
-@pytest.mark.parametrize("name", ["row_shift_clocks", "shift_clocks", "row_chain_lines", "column_chain_lines"])
-def test_a_slip_in_the_gatewares_clocks_is_seen(bench, rng, monkeypatch, name):
-    skin = skin_of((10, 2), (10, 2), settle_us=4.0, release_us=1.5)
-    cells = changing(rng, skin, slots(skin, 12))
-    wanted = expected_driven(skin, len(cells)), expected_rows(skin, cells)
-    slipped = getattr(skin.derived, name) + 1
-    monkeypatch.setattr(Derived, name, property(lambda self: slipped))
-    got = run(bench, skin, cells)
-    assert (got.driven, got.rows) != wanted
 
 
 # ---- the compiled board

@@ -18,15 +18,9 @@ from contactfpga_sim.verify.proofs.inside import Inside
 SKINS = {
     "reference": {},
     "1x1": {"rows": 1, "columns": 1},
-    "1x64": {"rows": 1, "columns": 64},
-    "64x1": {"rows": 64, "columns": 1},
-    "64x64": {"rows": 64, "columns": 64, "settle_us": 20.0},
     "64x64, 4": {"rows": 64, "columns": 64, "settle_us": 20.0, "connectivity": 4, "debounce": "sym_defer_pk"},
-    "1x1, all else": {"rows": 1, "columns": 1, "diodes": "row2col", "send": "on_change", "debounce": "sym_defer_pk"},
     "2x1, cells": {"rows": 2, "columns": 1, "report": "cells", "send": "on_change", "keep_alive_ms": 1.0},
-    "13x6": {"rows": 13, "columns": 6, "mask": ((0, 0), (12, 5)), "debounce": "asym_eager_defer_pk"},
     "64x64, barycenter": {"rows": 64, "columns": 64, "report": "barycenter", "labeller": "serial"},
-    "64x64, cells": {"rows": 64, "columns": 64, "report": "cells", "debounce": "asym_eager_defer_pk"},
     "slow": {"rows": 5, "columns": 3, "clock_hz": 1_000_000, "baud": 9600, "settle_us": 10_000.0},
     "fast": {"clock_hz": 100_000_000, "baud": 10_000_000, "zone_capacity": 1},
     "64x64, registers": {
@@ -37,7 +31,6 @@ SKINS = {
         "column_read": "74hc165",
         "column_chains": 8,
     },
-    "cylinder": {"surface": "cylinder", "radius_mm": 40.0},
 }
 
 

@@ -15,12 +15,8 @@ from contactfpga.skin.derived import Widths
 from contactfpga.wire import protocol
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden import Timeline, predict
-from contactfpga_sim.model.golden.debounce import debounced
 from contactfpga_sim.model.golden.facts import facts
-from contactfpga_sim.model.golden.hello import State, hello
-from contactfpga_sim.model.golden.link import Link
-from contactfpga_sim.model.golden.packet import Packet, stuff
-from contactfpga_sim.model.golden.request import Reception
+from contactfpga_sim.model.golden.packet import stuff
 from contactfpga_sim.model.golden.uart import Byte, line, received
 from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for, stimulus
 
@@ -103,33 +99,6 @@ def test_last_byte_of_a_one_zone_frame_keeps_the_stated_bound():
 
 
 @pytest.mark.parametrize(
-    ("method", "press", "release", "reads", "counts"),
-    [
-        ("none", 9, 9, "0101", "0101"),
-        ("sym_defer_pk", 0, 0, "0110100", "0110100"),
-        ("sym_defer_pk", 2, 1, "0110111101001", "0000001111100"),
-        ("sym_defer_pk", 1, 2, "1100100011", "0111111001"),
-        ("asym_eager_defer_pk", 0, 0, "0100", "0100"),
-        ("asym_eager_defer_pk", 1, 1, "01001", "01101"),
-        ("asym_eager_defer_pk", 3, 0, "01000", "01110"),
-        ("asym_eager_defer_pk", 3, 1, "010001", "011111"),
-        ("asym_eager_defer_pk", 3, 1, "0100000", "0111100"),
-        ("asym_eager_defer_pk", 1, 2, "1010001", "1111101"),
-    ],
-)
-def test_debounce_by_hand(method, press, release, reads, counts):
-    samples = np.array([read == "1" for read in reads])[:, None, None]
-    assert "".join("01"[int(state)] for state in debounced(samples, method, press, release)[:, 0, 0]) == counts
-
-
-def test_debounced_row_is_late_by_its_columns_and_three():
-    skin = Skin(debounce="asym_eager_defer_pk", debounce_press_us=0.0, debounce_release_us=0.0)
-    trace = predict(skin, Timeline.frames(skin, [cells_at((0, 4))]), SCAN)
-    assert trace.rows[0] == (62 + 16 + 3, 16, False)
-    assert trace.contact == [(62, 1)]
-
-
-@pytest.mark.parametrize(
     "plain",
     [b"", b"\0", b"\0\0", b"\1", b"\1\0", b"\0\1", b"\1" * 253, b"\1" * 254, b"\1" * 255, b"\1" * 508, b"\1" * 509]
     + [b"\1" * 254 + b"\0", b"\1" * 254 + b"\0\1", b"\0" + b"\1" * 254, b"\1" * 253 + b"\0" + b"\2" * 254],
@@ -137,36 +106,6 @@ def test_debounced_row_is_late_by_its_columns_and_three():
 def test_stuffing_agrees_with_the_cobs_package_and_the_driver(plain):
     assert stuff(plain) == cobs.encode(plain) == protocol.cobs_encode(plain)
     assert protocol.cobs_decode(stuff(plain)) == plain
-
-
-def test_stuffing_agrees_on_random_bytes():
-    rng = np.random.default_rng(0)
-    for length in rng.integers(0, 1200, 200):
-        plain = bytes((rng.integers(1, 256, length) * (rng.random(length) > rng.choice([0, 0.002, 0.3]))).tolist())
-        assert stuff(plain) == cobs.encode(plain)
-
-
-def test_a_full_block_costs_a_cycle_with_the_byte_behind_it():
-    packet = Packet()
-    assert packet.push(b"\1" * 254) == 254
-    assert packet.push(b"\1") == 2
-    assert packet.push(b"\1" * 253) == 253
-    assert packet.push(b"\0") == 2
-    assert packet.push(b"\1\0\1") == 3
-
-
-def test_link_sends_a_hello_first_and_answers_several_wishes_once():
-    known = facts(Skin())
-    link = Link(known, State(known, [], Reception([], [])))
-    size = len(hello(known))
-    link.want_hello(0)
-    link.offer(0, b"f\0")
-    link.want_hello(1)
-    link.advance(10_000)
-    # taken at 0, first byte at 2, a byte takes 40; the hello wanted at 1 comes before the frame
-    assert [cycle for cycle, _ in link.bytes] == [2 + 40 * place for place in range(2 * size + 2)]
-    assert bytes(value for _, value in link.bytes) == 2 * hello(known) + b"f\0"
-    assert link.sent == 1
 
 
 def test_serial_line_by_hand():

@@ -3,62 +3,18 @@
 import cv2
 import numpy as np
 import pytest
+import zone_oracles
 from label_rules import row_rule
 from zone_oracles import cells_of, every_frame, zones_by_scipy, zones_of_frames
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden.label import labelling
+from contactfpga_sim.model.golden.zones import closed_flood
+from contactfpga_sim.model.scenes import shapes
 
 CONNECTIVITIES = (4, 8)
-SHAPES = [
-    (1, 1),
-    (1, 2),
-    (1, 17),
-    (17, 1),
-    (2, 2),
-    (3, 64),
-    (64, 3),
-    (5, 7),
-    (16, 16),
-    (13, 6),
-    (33, 20),
-    (64, 64),
-]
-
-SPIRAL = """
-#########
-........#
-#######.#
-#.....#.#
-#.###.#.#
-#.#...#.#
-#.#####.#
-#.......#
-#########
-"""
-COMB = """
-#.#.#.#.#
-#.#.#.#.#
-#########
-"""
-NESTED_U = """
-#.#.#.#
-#.#.#.#
-#.#.#.#
-#.###.#
-#.....#
-#######
-"""
-RINGS = """
-#######
-#.....#
-#.###.#
-#.#.#.#
-#.###.#
-#.....#
-#######
-"""
+SHAPES = [(1, 1), (1, 17), (17, 1), (3, 64), (64, 3), (5, 7), (16, 16), (33, 20), (64, 64)]
 
 
 def random_frames(rng: np.random.Generator, shape: tuple[int, int], count: int) -> np.ndarray:
@@ -147,26 +103,6 @@ def test_frames_beyond_one_portion_keep_their_places():
 
 
 @pytest.mark.parametrize(
-    ("art", "connectivity", "zones"),
-    [
-        (SPIRAL, 8, [(49, 198, 198)]),
-        (COMB, 8, [(19, 76, 23)]),
-        (NESTED_U, 4, [(9, 27, 15), (17, 51, 55)]),
-        (RINGS, 8, [(8, 24, 24), (24, 72, 72)]),
-        ("#. .#", 8, [(2, 1, 1)]),
-        ("#. .#", 4, [(1, 0, 0), (1, 1, 1)]),
-        ("#.#.# .#.#. #.#.#", 8, [(8, 16, 8)]),
-        ("#.#.# .#.#. #.#.#", 4, sorted((1, x, y) for y in range(3) for x in range(5) if (x + y) % 2 == 0)),
-        ("... ...", 8, []),
-    ],
-)
-def test_known_shapes(art, connectivity, zones):
-    cells = cells_of(art)
-    assert golden.zones(cells, connectivity) == zones
-    assert vector_zones(cells[None], connectivity) == [(0, *zone) for zone in zones]
-
-
-@pytest.mark.parametrize(
     ("art", "connectivity", "steps", "departures"),
     [
         # one run above, none below: a step emits it with the next row
@@ -216,11 +152,22 @@ def test_column_rule_by_hand(art, connectivity, busy, departures):
     assert [(zone.row, zone.clock) for zone in work.departures] == departures
 
 
-@pytest.mark.parametrize(("connectivity", "worst"), [(8, max(4 + 2, 6)), (4, max(2 * 4 + 2, 8))])
-def test_rule_keeps_the_latency_bound_for_every_4x4_frame(connectivity, worst):
-    frames = every_frame(4, 4)
-    clocks = golden.last_record_clocks(frames, connectivity)
-    assert 0 < clocks.max() <= worst
-    final = np.pad(frames[:, 2:], ((0, 0), (0, 0), (1, 0)))
-    runs = (final[:, :, 1:] & ~final[:, :, :-1]).sum(axis=(1, 2))
-    assert clocks[runs <= 4].max() <= 8
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("columns", [3, 4, 7])
+def test_zones_around_a_cylinder_are_those_of_an_unrolled_sheet(connectivity, columns):
+    """Random frames; rings, helices and spirals. Flood fill and the rule for many frames agree on each."""
+    rng = np.random.default_rng(columns)
+    some = zone_oracles.noise(rng, 8, columns, 100)
+    frames = np.concatenate([some, zone_oracles.mazes(rng, 8, columns, 50), shapes.around(8, columns)[::5]])
+    departures = golden.all_departures(frames, connectivity, closed=True)
+    found = zone_oracles.of_records(departures.frame, departures.moments, columns)
+    assert np.array_equal(found, zone_oracles.zones(frames, connectivity))
+    assert {zone_oracles.RING, zone_oracles.WOUND} <= {*found[:, 2].tolist()}
+    for index, cells in enumerate(frames):
+        labels, turned = closed_flood(cells, connectivity)
+        records = []
+        for zone, past in enumerate(turned, 1):
+            y, x = np.nonzero(labels == zone)
+            records.append((len(x), int(x.sum()), int(y.sum()), past))
+        of_many = departures.moments[departures.offsets[index] : departures.offsets[index + 1]].tolist()
+        assert sorted(map(tuple, of_many)) == sorted(records)

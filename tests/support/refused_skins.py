@@ -5,7 +5,6 @@ REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
 REFUSED = [
     ({"name": 7}, "name is 7; it must be a string"),
     ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
-    ({"name": "a\n"}, r"name is 'a\n'; it must be printable, with no spaces around it"),
     ({"name": "ä" * 17}, f"name is '{'ä' * 17}', 34 bytes of UTF-8; at most 32 are possible"),
     # faults
     ({"guard": 1}, "guard is 1; it must be true or false"),
@@ -21,10 +20,8 @@ REFUSED = [
         "diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'",
     ),
     ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
-    ({"row_order": 3}, "row_order is 3; it must be a list of whole numbers"),
     ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
     ({"rows": 2, "row_order": [0, 0]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 2 times"),
-    ({"rows": 2, "row_order": [1]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 0 times"),
     ({"columns": 2, "column_order": [1, 0, 2]}, "column_order must hold each line from 0 to 1 once; it has 3"),
     # pressure units
     ({"units": 9}, "units is 9; MCP3208 has 8 channels"),
@@ -49,7 +46,6 @@ REFUSED = [
         "unit_sums holds [0, 0]; it must hold a weight for each of 2 units, not all 0",
     ),
     ({"units": 2, "unit_sums": [[1, 128]]}, "unit_sums holds [1, 128]; weights are whole numbers from -127 to 127"),
-    ({"units": 2, "unit_sums": [[1, 0.5]]}, "unit_sums holds [1, 0.5]; weights are whole numbers from -127 to 127"),
     # the sheet
     ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
@@ -57,29 +53,20 @@ REFUSED = [
     ({"columns": 65}, "columns is 65; it must lie between 1 and 64"),
     ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
     ({"rows": True}, "rows is True; it must be a whole number"),
-    ({"rows": "16"}, "rows is '16'; it must be a whole number"),
     ({"pitch_x_mm": 0}, "pitch_x_mm is 0.0; it must lie between 0.01 and 1000.0 mm"),
-    ({"pitch_y_mm": -1}, "pitch_y_mm is -1.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_y_mm": 1001}, "pitch_y_mm is 1001.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_x_mm": float("nan")}, "pitch_x_mm is nan; it must be a finite number"),
-    ({"pitch_x_mm": float("inf")}, "pitch_x_mm is inf; it must be a finite number"),
-    ({"pitch_x_mm": None}, "pitch_x_mm is None; it must be a finite number"),
     ({"pitch_x_mm": "10"}, "pitch_x_mm is '10'; it must be a finite number"),
     ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
     ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
     ({"connectivity": 8.0}, "connectivity is 8.0; it must be one of 4, 8"),
-    ({"connectivity": True}, "connectivity is True; it must be one of 4, 8"),
-    ({"connectivity": "8"}, "connectivity is '8'; it must be one of 4, 8"),
-    ({"surface": 8}, "surface is 8; it must be one of 'plane', 'cylinder'"),
     ({"surface": ["plane"]}, "surface is ['plane']; it must be one of 'plane', 'cylinder'"),
     ({"mask": [(0, 1.0)]}, "mask holds (0, 1.0); it must hold [row, column] pairs"),
-    ({"mask": [(0, True)]}, "mask holds (0, True); it must hold [row, column] pairs"),
     # its surface
     ({"surface": "sphere"}, "surface is 'sphere'; it must be one of 'plane', 'cylinder'"),
     ({"radius_mm": 50}, "radius_mm is 50.0; a plane has none, leave it out"),
     ({"surface": "cylinder"}, "radius_mm is missing; surface = 'cylinder' needs it"),
     ({"surface": "cylinder", "radius_mm": 0.05}, "radius_mm is 0.05; it must lie between 0.1 and 100000.0 mm"),
-    ({"surface": "cylinder", "radius_mm": -50}, "radius_mm is -50.0; it must lie between 0.1 and 100000.0 mm"),
     (
         {"surface": "cylinder", "radius_mm": 25},
         "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet; set "
@@ -103,21 +90,13 @@ REFUSED = [
     ),
     ({**CLOSED, "labeller": "single"}, "labeller is 'single'; closed = true needs labeller = 'run' or 'serial'"),
     (
-        {**CLOSED, "labeller": "projection"},
-        "labeller is 'projection'; closed = true needs labeller = 'run' or 'serial'",
-    ),
-    (
         {**CLOSED, "report": "barycenter"},
         "report is 'barycenter'; closed = true needs report = 'moments' or 'cells'",
     ),
     ({**CLOSED, "diodes": "none", "connectivity": 4}, "diodes is 'none'; closed = true needs 'col2row' or 'row2col'"),
     # its mask
     ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
-    ({"mask": "ab"}, "mask is 'ab'; it must be a list of [row, column]"),
     ({"mask": [3]}, "mask holds 3; it must hold [row, column] pairs"),
-    ({"mask": [(1, 2, 3)]}, "mask holds (1, 2, 3); it must hold [row, column] pairs"),
-    ({"mask": [(1.0, 2)]}, "mask holds (1.0, 2); it must hold [row, column] pairs"),
-    ({"mask": [(True, 2)]}, "mask holds (True, 2); it must hold [row, column] pairs"),
     ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
     ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
@@ -150,7 +129,6 @@ REFUSED = [
     ),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
-    ({"settle_us": -5}, "settle_us is -5.0; it must lie between 0.0 and 10000.0 us"),
     ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
@@ -198,11 +176,6 @@ REFUSED = [
         "with labeller = 'run'",
     ),
     (
-        {"scan": "adaptive", "rows": 64, "columns": 64},
-        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones per frame need 185 clocks (15.4167 us) "
-        "with labeller = 'run'",
-    ),
-    (
         {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.1},
         "keep_alive_ms is 0.1; one scan takes up to 0.156 ms",
     ),
@@ -220,17 +193,10 @@ REFUSED = [
         "precharge_us is 0.25; scan = 'adaptive' keeps rows driven and cannot drive the columns, scan = 'reversal' can",
     ),
     ({"precharge_us": -0.25}, "precharge_us is -0.25; it must lie between 0.0 and 10000.0 us"),
-    ({"precharge_us": 10_001}, "precharge_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
-    ({"precharge_us": float("nan")}, "precharge_us is nan; it must be a finite number"),
     ({"precharge_us": 1e-12}, "precharge_us is 1e-12; it must be at least one clock, 0.0833333 us"),
     ({"project_us": 2.0}, "project_us is 2.0; leave it out, or set scan = 'reversal'"),
-    (
-        {"scan": "adaptive", "project_us": 2.0},
-        "project_us is 2.0; leave it out, or set scan = 'reversal'",
-    ),
     ({"scan": "reversal"}, "precharge_us is 0; scan = 'reversal' drives the columns, and needs a time for it"),
     ({**REVERSAL, "project_us": 0}, "project_us is 0.0; it must be at least one clock, 0.0833333 us"),
-    ({**REVERSAL, "project_us": -1}, "project_us is -1.0; it must lie between 0.0 and 10000.0 us"),
     ({**REVERSAL, "project_us": 10_001}, "project_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {**REVERSAL, "row_drive": "74hc595"},
@@ -256,7 +222,6 @@ REFUSED = [
     ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'barycenter', 'cells'"),
     ({"report": "barycenter", "barycenter_bits": -1}, "barycenter_bits is -1; it must lie between 0 and 8"),
     ({"report": "barycenter", "barycenter_bits": 9}, "barycenter_bits is 9; it must lie between 0 and 8"),
-    ({"report": "barycenter", "barycenter_bits": 2.0}, "barycenter_bits is 2.0; it must be a whole number"),
     ({"barycenter_bits": 3}, "barycenter_bits is 3; leave it out, or set report = 'barycenter'"),
     ({"report": "cells", "barycenter_bits": 5}, "barycenter_bits is 5; leave it out, or set report = 'barycenter'"),
     (
@@ -269,14 +234,12 @@ REFUSED = [
     ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes up to 0.096 ms"),
     ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
-    ({"zone_capacity": 1.5}, "zone_capacity is 1.5; it must be a whole number"),
     # shift registers
     ({"row_drive": "74hc164"}, "row_drive is '74hc164'; it must be one of 'direct', '74hc595'"),
     ({"column_read": "spi"}, "column_read is 'spi'; it must be one of 'direct', '74hc165'"),
     ({"row_chains": 2}, "row_chains is 2; leave it out, or set row_drive = '74hc595'"),
     ({"column_chains": 0}, "column_chains is 0; leave it out, or set column_read = '74hc165'"),
     ({"row_drive": "74hc595", "row_chains": 0}, "row_chains is 0; it must lie between 1 and 16"),
-    ({"row_drive": "74hc595", "row_chains": 2.0}, "row_chains is 2.0; it must be a whole number"),
     ({"column_read": "74hc165", "column_chains": 17}, "column_chains is 17; it must lie between 1 and 16"),
     (
         {"columns": 9, "column_read": "74hc165", "column_chains": 4},
@@ -287,7 +250,6 @@ REFUSED = [
         "shift_hz is 4000000; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'",
     ),
     ({"row_drive": "74hc595", "shift_hz": 9_999}, "shift_hz is 9999; it must lie between 10000 and 50000000 Hz"),
-    ({"row_drive": "74hc595", "shift_hz": 8e6}, "shift_hz is 8000000.0; it must be a whole number"),
     # clock and line
     ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),

@@ -10,8 +10,14 @@ from scipy import ndimage
 from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
 
-CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
-RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
+RULES = [
+    (connectivity, name, closed)
+    for name, labeller in LABELLERS.items()
+    if labeller.exact
+    for connectivity in (8, 4)
+    for closed in (False, True)[: 1 + labeller.closed]
+]
+"""(connectivity, labeller, whether the sheet's ends meet) of each exact rule."""
 RING, WOUND = -1, -2
 """In place of the sum of the columns."""
 
@@ -47,18 +53,10 @@ def nearest(total, area, bits):
     return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
 
 
-def skin_of(rows, columns, connectivity, labeller):
-    return Skin(
-        rows=rows,
-        columns=columns,
-        connectivity=connectivity,
-        labeller=labeller,
-        surface="cylinder",
-        radius_mm=20.0,
-        closed=True,
-        settle_us=100,
-        zone_capacity=1,
-    )
+def skin_of(rows, columns, connectivity, labeller, closed=False):
+    around = {"surface": "cylinder", "radius_mm": 20.0, "closed": True} if closed else {}
+    rule = {"connectivity": connectivity, "labeller": labeller}
+    return Skin(rows=rows, columns=columns, settle_us=100, zone_capacity=1, **rule, **around)
 
 
 def zones(frames, connectivity, turns=7):
@@ -114,6 +112,27 @@ def every_frame(rows, columns, first=0, count=None):
     cells = rows * columns
     numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
     return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
+
+
+def mazes(rng, rows, columns, count):
+    """(count, rows, columns) bool: dots joined at random, in which zones nest deep, and sheared, so that ways wind
+    around a cylinder."""
+    frames = np.zeros((count, rows, columns), bool)
+    for frame in frames:
+        across, down, dots = rng.uniform(0.2, 0.6), rng.uniform(0.5, 0.95), rng.uniform(0.8, 1.0)
+        chance = np.zeros((rows, columns))
+        chance[::2, ::2], chance[::2, 1::2], chance[1::2, ::2] = dots, across, down
+        frame[:] = rng.random((rows, columns)) < chance
+        lean = rng.choice([-2, -1, 0, 0, 0, 1, 2])
+        for y in range(rows):
+            frame[y] = np.roll(frame[y], y * lean // 2)
+        frame |= rng.random((rows, columns)) < rng.choice([0.0, 0.05])
+    return frames
+
+
+def noise(rng, rows, columns, count):
+    """(count, rows, columns) bool: noise of every density."""
+    return rng.random((count, rows, columns)) < rng.uniform(0.02, 0.98, (count, 1, 1))
 
 
 def moments(cells):

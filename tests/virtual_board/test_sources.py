@@ -2,7 +2,6 @@
 
 import dis
 import os
-import random
 import shutil
 import subprocess
 import sys
@@ -183,21 +182,6 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
             ],
         ),
         ("contactfpga_hdl.board.sizes", ["../../../hdl/contactfpga_hdl/board/" + name for name in SIZING]),
-        (
-            "contactfpga_sim.lab.chart.compute",
-            [
-                "chart/errors.py",
-                "chart/speed.py",
-                "../model/golden/label.py",
-                "../../../py/contactfpga/skin/derived.py",
-            ],
-        ),
-        ("contactfpga_sim.lab.fit.measuring", ["fit/sources.py", "chart/compute.py", "../model/scenes/shapes.py"]),
-        ("contactfpga_sim.lab.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../model/board/compiled.py"]),
-        (
-            "contactfpga_sim.verify.mutants.campaign",
-            ["../verify/mutants/campaign.py", "../verify/mutants/stimuli.py", "../model/board/native.py"],
-        ),
     ],
 )
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
@@ -254,42 +238,6 @@ def test_imports_are_those_that_python_compiles(top):
     assert {name: left for name, left in missing.items() if left} == {}
 
 
-STATEMENTS = [
-    "import {0}",
-    "import os, {0} as other",
-    "from {0} import {1}",
-    "from {0} import ({1},  # not (all)\n    {2} as x)",
-    "from {0} import {1}, \\\n    {2}",
-    "from . import {1}",
-    "from .. import {1}",
-    "from .{0} import {1}",
-    "if True: import {0}",
-    "x = 1; import {0}",
-    "import {0}; from {1} import {2}",
-    "def f():\n    from {0} import {1}\n    return {1}",
-    "try:\n\timport {0}\nexcept ImportError: from {1} import {2}",
-    "class C:\n  def f(self):\n\n    if True:\n        import {0}",
-    "from {0} import *",
-    'x = """\nfrom here on import nothing\nimport {0}\n"""',
-    "# import of nothing\nx = 'import'",
-    "if TYPE_CHECKING:\n    import {0}\n\n    from {1} import {2}\n",
-    "if x:\n    pass\nelif TYPE_CHECKING:\n    pass\n",
-]
-
-
-@pytest.mark.parametrize("seed", range(60))
-def test_imports_in_whatever_form_are_found(seed):
-    rng = random.Random(seed)
-    names = ["a", "a.b", "pkg.c", "d_e", "fromage", "importer"]
-    lines = ["TYPE_CHECKING = x = False"]
-    for statement in rng.choices(STATEMENTS, k=rng.randint(1, 6)):
-        plain = [rng.choice(names).rpartition(".")[2] for _ in range(3)]
-        lines.append(statement.format(rng.choice(names), *plain[1:]))
-    text = "\n".join(lines) + "\n"
-    code = compile(text.replace("if TYPE_CHECKING:", "if False:"), "x.py", "exec")
-    assert set(imports_of(code, "pkg.inner")) <= sources._imported(text, "pkg.inner.module", False), text
-
-
 def test_files_of_ones_own_count_with_what_they_import_from_beside_them(tmp_path):
     texts = {"lab.py": "import helper\nfrom parts import one", "helper.py": "", "parts/one.py": "from . import two"}
     texts |= {"parts/two.py": "", "parts/__init__.py": "", "unused.py": ""}
@@ -333,31 +281,3 @@ def test_another_compiler_version_or_option_is_another_library(tmp_path, monkeyp
     script.touch()
     assert key(str(script)) in found
     native._said.cache_clear()
-
-
-COUNTED = """
-import numpy as np
-from contactfpga.skin import Skin
-from contactfpga_sim.model.board.compiled import CompiledBoard
-skin = Skin(rows=2, columns=2)
-with CompiledBoard(skin, capture=("rows",)) as board:
-    board.run(2000)
-    print(skin.derived.row_clocks, int(np.diff(board.take("rows")["cycle"])[4]))
-"""
-
-
-@pytest.mark.slow  # it compiles two boards
-def test_host_and_board_count_the_same_clocks_when_the_settle_time_is_changed(copy, tmp_path):
-    derived = copy / "py/contactfpga/skin/derived.py"
-    before = derived.read_text(encoding="utf-8")
-    counted = [run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache"))]
-    longer = before.replace(
-        "return max(self.clocks(self.skin.settle_us),", "return 3 + max(self.clocks(self.skin.settle_us),"
-    )
-    assert longer != before
-    derived.write_text(longer, encoding="utf-8")
-    counted.append(run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache")))
-    derived.write_text(before, encoding="utf-8")
-    (host, board), (later_host, later_board) = (map(int, lines[-1].split()) for lines in counted)
-    assert (host, later_host) == (board, later_board)
-    assert later_host == host + 3

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from histories import RATE_HZ, frame, frames, moving_touches
 
-import contactfpga
 from contactfpga import Skin, SkinMismatch, Watch
 from contactfpga.instruments.watch import cells_of
 
@@ -309,7 +308,3 @@ def test_a_small_sheet_needs_fewer_others():
     watch = Watch(skin, stuck_s=STUCK_S)
     found = [one for zones in frames(skin, stuck_at(cells, (1, 1)), 10.0) for one in watch.update(zones)]
     assert [one.cells for one in found] == [((1, 1),)]
-
-
-def test_watch_is_public():
-    assert contactfpga.Watch is Watch
