@@ -43,8 +43,8 @@ def test_flush_faces_take_the_stress_on_them(thickness, side):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 8.0, 9.0))])
-@pytest.mark.parametrize("stiffness", [math.inf, 4.0, 2.0])
+@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 9.0))])
+@pytest.mark.parametrize("stiffness", [math.inf, 2.0])
 def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
     """The largest force, on which it depends whether a touch is felt, is off by at most an eighth."""
     foam, sheet = FoamOnCaps(thickness, side, stiffness=stiffness), cells(capped(thickness, side, stiffness))
@@ -52,13 +52,6 @@ def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
         exact, found = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)), sheet.forces_n(finger(x, y))
         assert found.max() == pytest.approx(exact.max(), rel=0.125)
         assert found.sum() == pytest.approx(2.0, rel=1e-5)
-
-
-def test_a_switch_that_gives_way_beside_a_flush_base_loses_its_force():
-    """Why only proud caps may give way: of what a rigid flush cap takes, one on 4 N/mm keeps less than half."""
-    pressed = [FoamOnCaps(5.0, 8.0, stiffness=k, proud=False) for k in (math.inf, 4.0)]
-    rigid, soft = (foam.forces(foam.ellipse(45, 45, 7, 6, 2.0)).max() for foam in pressed)
-    assert soft < 0.45 * rigid
 
 
 # ---- against closed forms

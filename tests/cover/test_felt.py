@@ -67,13 +67,6 @@ def test_a_window_of_a_large_sheet_takes_what_the_whole_sheet_does():
     assert found.median_share == pytest.approx(np.median(peaks), rel=1e-5)
 
 
-def test_a_finger_on_a_tile_of_its_own_is_felt_at_the_switch_s_force():
-    found = feel(tiles(0.7), Sheet(5, 5, 10e-3, 10e-3), 4e-3, 4e-3, places=400)
-    assert found.half.value_n == pytest.approx(0.7)
-    assert found.worst.value_n == pytest.approx(4 * 0.7, rel=0.3)  # between four
-    assert found.worst.value_n <= 4 * 0.7 + 1e-9
-
-
 def test_places_fill_the_sheet_evenly():
     """Each sixteenth of the sheet gets its share of them, and each quarter of the angles."""
     x, y, angle = spread_evenly(1600, SHEET).T
@@ -96,12 +89,6 @@ def test_forces_of_drawn_sheets_lie_in_the_interval():
     others = [feel(cover, SHEET, places=150, seed=1000 + 40 * n).most.value_n for n in range(2)]
     assert all(found.most.low_n < other < found.most.high_n for other in others)
     assert feel(tiles(0.5), SHEET, places=50).sheets == 1
-
-
-def test_twice_the_closing_force_takes_twice_the_force():
-    light, heavy = (feel(tiles(force), SHEET, places=60) for force in (0.4, 0.8))
-    assert heavy.worst.value_n == pytest.approx(2 * light.worst.value_n)
-    assert heavy.least_share == light.least_share
 
 
 def test_fingers_on_absent_switches_are_not_felt():
