@@ -38,16 +38,8 @@ def test_stiffness_undoes_time(inertia, lever, speed, stiffness, torque, weight,
     ("ask", "reason"),
     [
         (
-            lambda: impact.strike(arm(torque_nm=100.0), SPEED, 1e3),
-            "the torque wins: without any speed it presses the foam in by 630 mm, the lever's length is 200 mm",
-        ),
-        (
             lambda: impact.strike(arm(torque_nm=20.0), SPEED, FIRST, thickness_m=0.005),
             "the torque wins: without any speed it presses the foam in by 10.77 mm, the foam's thickness is 5 mm",
-        ),
-        (
-            lambda: impact.strike(arm(), SPEED, FIRST, thickness_m=0.003),
-            "the foam bottoms out: pressed in by 3.78 mm, it is 3 mm thick",
         ),
         (
             lambda: impact.strike(arm(), SPEED, 1.0),
@@ -64,11 +56,6 @@ def test_stiffness_undoes_time(inertia, lever, speed, stiffness, torque, weight,
         (
             lambda: impact.stiffness_for(arm(torque_nm=-1.0), SPEED, 0.0315),
             "a compression of 31.5 ms: torque and gravity stop the arm within 31.43 ms whatever the foam",
-        ),
-        (
-            lambda: impact.stiffness_for(arm(torque_nm=1.0), SPEED, 0.6),
-            "a compression of 600 ms: the foam would be pressed in by more than the lever's length, 200 mm; "
-            "that takes 216.9 ms",
         ),
         (
             lambda: impact.stiffness_for(arm(), SPEED, 0.008, thickness_m=0.002),

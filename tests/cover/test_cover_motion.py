@@ -99,7 +99,7 @@ def random_blows(count):
 @pytest.mark.slow
 def test_quadrature_against_30_digit_arithmetic(record_property):
     cases = 0
-    for moved, speed, stiffness in random_blows(12):
+    for moved, speed, stiffness in random_blows(8):
         found = impact.strike(moved, speed, stiffness, method="quadrature")
         if isinstance(found, NoSolution):
             continue
@@ -108,7 +108,7 @@ def test_quadrature_against_30_digit_arithmetic(record_property):
         assert found.time_s == pytest.approx(seconds, rel=1e-12), moved
         cases += 1
     record_property("cases", cases)
-    assert cases > 7
+    assert cases > 5
 
 
 def test_an_integral_that_does_not_converge_is_none():

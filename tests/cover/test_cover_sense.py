@@ -75,13 +75,6 @@ def test_the_answer_is_within_the_tolerance_whatever_model_gives_it(ball):
     assert len(taken) >= 2
 
 
-def test_reach_takes_the_simplest_model_too():
-    sheet = PaddedSheet(SWITCH, 5e-3)
-    found = sheet.reaches(15.0)
-    assert (found.model, abs(found.error) < 0.05) == (HALFSPACE, True)
-    assert sheet.reaches(300.0).model == BONDED
-
-
 def test_past_the_zero_no_force_closes_the_switch():
     assert round(medium.first_zero("bonded"), 3) == 1.671
     assert round(medium.first_zero("frictionless"), 3) == 1.566

@@ -107,13 +107,6 @@ def test_on_a_closed_sheet_a_finger_over_the_seam_presses_both_sides():
     assert not isinstance(closed, NoSolution)
 
 
-def test_false_presses_are_those_of_the_cells():
-    cover = tiles(0.5, spread=0.2, preload_n=0.1)
-    cells = Cells(cover, SHEET.rows, SHEET.columns, SHEET.pitch_x_m, SHEET.pitch_y_m)
-    found = feel(cover, SHEET, places=1, acceleration_m_s2=500.0, foam_kg_m3=300.0)
-    assert found.false_presses == cells.false_presses(500.0, 300.0) > 0
-
-
 def test_a_bonded_layer_pulls_where_no_force_is_felt():
     """Thin foam, small faces, wide pitch: between four switches no force closes one."""
     found = feel(Cover("bonded", 1e-3), Sheet(6, 6, 30e-3, 30e-3), places=100)
