@@ -115,13 +115,6 @@ def test_alive_takes_one_pin_which_the_sheet_then_does_not(board):
 
 
 @every_board
-def test_guard_lines_follow_the_sheets(board):
-    skin = Skin(rows=3, columns=4, guard=True)
-    assert board.pins(skin)["rows"] == board.row_side[:4]
-    assert board.pins(skin)["columns"] == board.column_side[:5]
-
-
-@every_board
 def test_crystal_is_the_clock_of_the_platform(board):
     stated = [line.split() for line in constraints(board.name).splitlines() if "frequency" in line.lower()]
     hertz = [float(words[-1]) * 1e6 if board.constraints.endswith("pcf") else float(words[-2]) for words in stated]
@@ -181,24 +174,6 @@ def test_an_external_bridge_has_two_pins_and_a_line_that_rests_high_where_none_i
         ),
         (
             ICEBREAKER,
-            {"columns": 20},
-            "16 rows and 20 columns take 4 + 20 wires, iCEBreaker has 23 free pins beside `contact`; "
-            'set column_read = "74hc165"',
-        ),
-        (
-            ICEBREAKER,
-            {"row_drive": "direct", "rows": 3, "columns": 30, "settle_us": 5},
-            "3 rows and 30 columns take 3 + 30 wires, iCEBreaker has 23 free pins beside `contact`; "
-            'set column_read = "74hc165"',
-        ),
-        (
-            ICEBREAKER,
-            {"row_drive": "direct", "rows": 30, "column_read": "74hc165", "precharge_us": 0},
-            "30 rows and 16 columns take 30 + 3 wires, iCEBreaker has 23 free pins beside `contact`; "
-            'set row_drive = "74hc595"',
-        ),
-        (
-            ICEBREAKER,
             {"row_chains": 16, "column_read": "74hc165", "precharge_us": 0, "column_chains": 8},
             "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
         ),
@@ -247,15 +222,6 @@ def test_a_sheet_that_takes_every_pin_is_taken(board):
     board.check(skin.replace(rows=board.lines - 4))
     with pytest.raises(SkinError):
         board.check(skin.replace(rows=board.lines - 3))
-
-
-def test_the_example_of_64x64_fits_the_pins_of_the_icebreaker():
-    skin = Skin.load(ROOT / "examples" / "icebreaker-64x64.toml")
-    assert (skin.rows, skin.columns) == (64, 64)
-    ICEBREAKER.check(skin)
-    text = " ".join((ROOT / PAGE).read_text().split())  # however its lines are wrapped
-    wires = sum(len(pins) for pins in ICEBREAKER.pins(skin).values())
-    assert f"with {wires} wires and a scan in {skin.derived.frame_clocks / 12_000:.1f} ms" in text
 
 
 def test_unknown_board_is_named_with_the_known_ones():

@@ -9,11 +9,9 @@ import pytest
 from sample import sample
 
 from contactfpga.boards import BOARDS, wiring
-from contactfpga.boards.wiring import ohms
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import lay_out
 from contactfpga.tools import cli
-from contactfpga.tools.commands.build import WiringTable
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 
@@ -106,16 +104,6 @@ def test_each_line_of_the_sheet_is_led_to_once(name):
     assert ("alive" in {wire.port for wire in wiring.wires(board, skin)}) == skin.alive
 
 
-def test_an_order_says_which_pin_a_row_is_soldered_to():
-    board = BOARDS["icebreaker"]
-    skin = board.skin.replace(**CHANGES["orders"])
-    by_port = {wire.port: wire.line.leads_to for wire in wiring.wires(board, skin)}
-    for row, line in enumerate(skin.row_order):
-        assert by_port[f"rows[{line}]"] == f"row {row}"
-    for column, line in enumerate(skin.column_order):
-        assert by_port[f"columns[{line}]"] == f"column {column}"
-
-
 def test_chips_and_outputs_are_those_of_the_data_sheets():
     skin = BOARDS["icebreaker"].skin.replace(**CHAINED, row_chains=2)
     found = {one.line.leads_to: one.place for one in wiring.outputs(skin)}
@@ -127,27 +115,6 @@ def test_chips_and_outputs_are_those_of_the_data_sheets():
     assert found["column 8"] == ("74HC165", "0", "1", "H 6")
     places = [(one.chip, one.chain, one.number, one.pin) for one in wiring.outputs(skin)]
     assert len({*places}) == len(places)
-
-
-@pytest.mark.parametrize("name", ["chained", "two and three chains", "guard, chained"])
-def test_chains_are_as_long_as_the_gateware_shifts(name):
-    skin = skin_of(BOARDS["ulx3s-85f"], name)
-    for chip, lines in (("74HC595", skin.derived.row_chain_lines), ("74HC165", skin.derived.column_chain_lines)):
-        chained = [one for one in wiring.outputs(skin) if one.chip == chip]
-        assert max(sum(one.chain == chain for one in chained) for chain in {one.chain for one in chained}) == lines
-
-
-def test_guard_lines_are_the_last_whatever_the_order():
-    for name in ("guard and alive", "guard and orders"):
-        skin = skin_of(BOARDS["icebreaker"], name)
-        assert wiring.row_lines(skin)[-1].leads_to == "guard row"
-        assert wiring.column_lines(skin)[-1].leads_to == "guard column"
-
-
-def test_guard_lines_are_the_last_of_their_chains():
-    skin = skin_of(BOARDS["ulx3s-85f"], "guard, chained")
-    for chip, kind in (("74HC595", "row"), ("74HC165", "column")):
-        assert [one.line.leads_to for one in wiring.outputs(skin) if one.chip == chip][-1] == f"guard {kind}"
 
 
 @pytest.mark.parametrize(
@@ -217,18 +184,6 @@ def test_one_object_holds_what_was_built(tmp_path, monkeypatch, capsys):
     assert len(answer["wires"]) == 4 + 16 + 4
     assert len(answer["outputs"]) == 16
     assert {one["series_ohm"] for one in answer["outputs"]} == {33}
-
-
-@pytest.mark.parametrize(("value", "text"), [(33.0, "33 Ω"), (4700.0, "4.7 kΩ"), (100_000.0, "100 kΩ"), (1e6, "1 MΩ")])
-def test_resistances_read_as_on_a_bag(value, text):
-    assert ohms(value) == text
-
-
-def test_a_circuit_without_series_resistors_names_none():
-    board = BOARDS["icestick"]
-    wires = wiring.wires(board, board.skin)
-    table = WiringTable(board, board.skin, Circuit(), sites.wire_sites(board, wires))
-    assert {one["series_ohm"] for one in table.to_dict()["wires"]} == {None}
 
 
 @pytest.mark.parametrize("name", CHANGES)

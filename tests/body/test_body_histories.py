@@ -190,13 +190,3 @@ def test_states_and_frames_are_those_of_the_world(body, seed):
     for _ in range(600):
         history.step()
     assert history.seen == {"ok", "late", "silent", "lost", "mismatch"}
-
-
-def test_a_link_that_was_never_there_has_no_data_and_no_age(body):
-    history = History(body, 0)
-    for _ in range(5):
-        for reader in history.readers.values():
-            reader.step()
-    state = history.readers["arm"].state()
-    assert (state.zones, state.age_s, state.status) == (None, None, "lost")
-    assert str(state) == "lost (no frame yet; arm cannot be opened: it is not there)"

@@ -96,27 +96,20 @@ def test_missing_angle_is_named(jvrc):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('type="fixed"', 'type="loose"', "joint 'still' is of type 'loose'; it must be one of"),
         ('type="fixed"', 'type="floating"', "joint 'still' is of type 'floating'; only the single joint of the"),
-        ('<link name="a"/>', '<link name="a"/><link name="a"/>', "two links are named 'a'"),
         ("<robot", '<robot version="1.3"', "version is '1.3'; known are 1.0, 1.1, 1.2"),
         ('rpy="0.4 -0.5 0.6"', 'quat_xyzw="0 0 1 1"', 'quat_xyzw before URDF 1.1; write <robot version="1.1">'),
-        ('rpy="0.4 -0.5 0.6"', 'rpw="0 0 1"', "the origin of joint 'turns' has 'rpw'; it may have xyz, and rpy or"),
         ("</robot>", '<xacro:if value="0"/></robot>', "this is xacro; expand it with `xacro FILE > expanded.urdf`"),
         ('xyz="0 0 3"', 'xyz="0 0 ${h}"', "this is xacro; expand it with `xacro FILE > expanded.urdf`"),
         ('type="continuous"', 'type="planar"', "joint 'follows' follows 'turns', which is not there"),
-        (KINDS, "<robot/>", "no link; is it xacro?"),
         ('<link name="a"/>', "", "joint 'turns' names the link 'a', which is not there"),
         (
             '<link name="d"/>',
             '<link name="d"/><link name="e"/>',
             "2 links hang on no joint; a robot has one base",
         ),
-        ('joint="turns" multi', 'joint="follows" multi', "joint 'follows' follows itself"),
-        ('xyz="0 0 3"', 'xyz="0 0 0"', "the axis of joint 'slides' has no direction"),
         ('xyz="0 0 3"', 'xyz="0 0 nan"', "joint 'slides' says 'nan' where a finite number is due"),
         ("<robot", "<!DOCTYPE x><robot", "it declares a document type, which a URDF file does not need; remove it"),
-        ("</robot>", "", "not a URDF file"),
     ],
 )
 def test_urdf_that_cannot_be_is_refused_in_one_line(tmp_path, old, new, says):

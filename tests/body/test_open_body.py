@@ -58,16 +58,6 @@ def test_open_body_goes_on_without_a_link_and_takes_it_back(patient, leap):
         body.latest()
 
 
-def test_ids_stay_with_contacts_that_move(patient):
-    plugged = Plugged()
-    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
-        first = body.read(LONG).contacts("link", links=["chest"])
-        plugged.ports["b"].moments = [(4, 11, 6)]
-        moved = body.read(LONG).contacts("link", links=["chest"])
-        assert [one.track for one in first] == [one.track for one in moved] == [1]
-        assert moved[0].point_m != first[0].point_m
-
-
 def test_read_waits_for_frames_scanned_after_the_call(patient):
     plugged = Plugged()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
@@ -146,14 +136,6 @@ def test_batch_holds_each_frame_of_each_link_once(patient):
         seen = {one.links[name].zones.time_us for one in batch if one.links[name].zones is not None}
         assert arrays.frames["time_us"].tolist() == sorted(seen)
         assert len(arrays.zones) == len(seen), "each frame has one zone"
-
-
-def test_batch_of_a_link_without_frames_has_no_arrays_of_it(patient):
-    plugged = Plugged()
-    del plugged.ports["a"]
-    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
-        body.read(LONG)
-        assert set(body.batch(0.05, LONG).links) == {"chest"}
 
 
 def test_stats_go_on_where_a_board_comes_back(patient):

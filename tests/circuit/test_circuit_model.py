@@ -99,33 +99,10 @@ def test_published_settle_times(changes, nanoseconds):
     assert settle_ns(Circuit(**changes), np.ones((16, 16), bool)) == pytest.approx(nanoseconds, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("size", "ohms", "lift_v", "rows_us", "dip_v", "columns_us"),
-    [(16, 4700.0, 1.68, 0.24, 1.62, 0.10), (64, 4700.0, 2.62, 0.92, 0.68, 0.55), (64, 1e4, 2.62, 1.95, 0.68, 1.17)],
-)
-def test_published_projections(size, ohms, lift_v, rows_us, dip_v, columns_us):
-    network = Network(Circuit(column_pull_ohm=ohms, row_pull_ohm=ohms), patterns.named(size, size)["one cell"])
-    rows = phases.passed(phases.project_rows(network, LEVELS, lifted=True))
-    columns = phases.passed(phases.project_columns(network, LEVELS))
-    assert rows.trace.volts[:, size].max() == pytest.approx(lift_v, rel=0.05)
-    assert columns.trace.volts[:, 0].min() == pytest.approx(dip_v, rel=0.05)
-    assert 1e6 * rows.seconds == pytest.approx(rows_us, rel=0.05)
-    assert 1e6 * columns.seconds == pytest.approx(columns_us, rel=0.1)
-
-
-def test_published_levels_of_a_column_that_feeds_64_rows():
-    worst = static.projection(Circuit(row_pull_ohm=4700.0), 64, 64)
-    assert worst.level_v == pytest.approx(1.97, abs=0.02)
-    assert worst.margin_v == pytest.approx(-0.03, abs=0.02)
-    assert worst.pin_ma == pytest.approx(64 * worst.level_v / 4.7, rel=0.02)
-
-
 # ---- the named patterns are the worst ones
 
 
-@pytest.mark.parametrize(
-    "changes", [{}, {"neighbor_pf": 15.0}, {"switch_ohm": 2000.0, "pin_ohm": 20.0}, {"line_ohm": 300.0}]
-)
+@pytest.mark.parametrize("changes", [{"neighbor_pf": 15.0}, {"switch_ohm": 2000.0, "pin_ohm": 20.0, "line_ohm": 300.0}])
 def test_no_random_pattern_is_worse(changes):
     rng = np.random.default_rng(6)
     circuit, size = Circuit(**changes), 6
@@ -143,26 +120,10 @@ def test_no_random_pattern_is_worse(changes):
         assert level >= min(one[1] for one in worst) - 1e-3
 
 
-def test_a_level_that_is_never_reached_takes_forever():
-    needs = needed(Circuit(column_pull_ohm=1000.0), 4, 4)
-    assert math.isinf(needs.settle.seconds)
-    assert needs.settle.us(1.3) is None
-    assert needs.unpressed_v < 3.3
-
-
-@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 3)])
-def test_small_sheets(rows, columns):
-    needs = needed(Circuit(), rows, columns)
-    assert 0 < needs.settle.seconds < 1e-6
-    assert 0 < needs.project.seconds < 1e-5
-
-
 @pytest.mark.parametrize(
     "changes",
     [
         {"column_pull_ohm": 100.0, "row_pull_ohm": 100.0},
-        {"series_ohm": 100_000.0, "row_pull_ohm": 1e8},
-        {"switch_ohm": 1e6, "line_pf": 100_000.0, "column_pull_ohm": 1e8},
         {"line_pf": 0.1, "crossing_pf": 0.0, "pin_ohm": 1.0, "diode": Diode(1e-18, 5.0, 0.0, 0.0, 2.0, 0.0)},
         {"diode": Diode(1e-3, 0.5, 0.0, 1000.0, 0.1, 0.9)},
     ],

@@ -25,7 +25,7 @@ def readings(seconds, rng, scatter, clock_hz=CLOCK_HZ, shape=(SIZE, SIZE // 2)):
     return [SettleReading(many, np.floor(each * lines * clock_hz).astype(int) + 1, 2) for many, each in seconds.items()]
 
 
-@pytest.mark.parametrize(("scatter", "clock_hz"), [(0.04, 60e6), (0.1, 60e6), (0.08, 24e6)])
+@pytest.mark.parametrize(("scatter", "clock_hz"), [(0.04, 60e6), (0.08, 24e6)])
 def test_all_intervals_together_cover_the_truth_as_often_as_they_say(scatter, clock_hz, monkeypatch):
     """Of 300 sheets: two standard deviations of their number below and above 95 %, and 1 % for the approximation."""
     monkeypatch.setattr(fitted, "settle_s", formula_s)
@@ -41,20 +41,20 @@ def test_all_intervals_together_cover_the_truth_as_often_as_they_say(scatter, cl
 
 
 def line_s(circuit, pressed):
-    """As the virtual board has it."""
-    line = ColumnLine.of(circuit, SIZE, SIZE)
+    """As the virtual board has it, of a sheet of 8x8."""
+    line = ColumnLine.of(circuit, 8, 8)
     return -line.press_s[pressed] * math.log(1 - line.threshold / line.pulled[pressed])
 
 
 def test_lines_that_do_not_scatter_give_the_values_that_made_them():
-    """But for the clock, here of 1 ns."""
+    """But for the clock, here of 0.1 ns."""
     truth = Circuit(line_pf=65, switch_ohm=220, series_ohm=33)
-    seconds = {many: line_s(truth, many) for many in (8, 16)}
-    made = readings(seconds, np.random.default_rng(0), 0.0, 1e9)
-    found = fit_circuit(Circuit(line_pf=50, switch_ohm=100, series_ohm=33), made, 1e9, SIZE, SIZE)
+    seconds = {many: line_s(truth, many) for many in (4, 8)}
+    made = readings(seconds, np.random.default_rng(0), 0.0, 1e10, (8, 4))
+    found = fit_circuit(Circuit(line_pf=50, switch_ohm=100, series_ohm=33), made, 1e10, 8, 8)
     assert found.circuit.line_pf == pytest.approx(65, rel=0.01)
     assert found.circuit.switch_ohm == pytest.approx(220, rel=0.03)
-    assert (found.rows, found.columns) == (SIZE, SIZE // 2)
+    assert (found.rows, found.columns) == (8, 4)
 
 
 def test_one_image_tells_the_capacitance_alone(monkeypatch):

@@ -47,15 +47,6 @@ def test_json_and_text_say_the_same(capsys):
     assert answer["circuit"]["line_pf"] == 30
 
 
-@pytest.mark.slow
-def test_the_margin_multiplies_what_the_model_says(capsys):
-    _, answer = asked(capsys, "--margin", "3")
-    computed = needed(Circuit(), 2, 3).settle.seconds
-    assert answer["settle_us"] == pytest.approx(3e6 * computed, abs=0.01)
-    assert answer["settle_us"] >= 3e6 * computed
-    assert answer["worst"]["settle"]["us"] == pytest.approx(1e6 * computed, abs=1e-5)
-
-
 @pytest.mark.usefixtures("quick")
 def test_every_value_of_the_circuit_has_an_option_that_counts(capsys):
     _, before = asked(capsys)
@@ -95,10 +86,10 @@ def test_a_sheet_that_cannot_work_says_which_and_what_helps(capsys):
 @pytest.mark.slow
 def test_the_skins_values_and_times(capsys, tmp_path):
     path = tmp_path / "skin.toml"
-    path.write_text('rows = 4\ncolumns = 5\ndiodes = "row2col"\nrelease_us = 1\n[circuit]\nline_pf = 60\n')
+    path.write_text('rows = 2\ncolumns = 3\ndiodes = "row2col"\nrelease_us = 1\n[circuit]\nline_pf = 60\n')
     assert cli.main(["settle", "--skin", str(path), "--switch-ohm", "200", "--json"]) == 3  # a time is too short
     answer = json.loads(capsys.readouterr().out)
-    assert (answer["rows"], answer["columns"], answer["diodes"]) == (4, 5, "row2col")
+    assert (answer["rows"], answer["columns"], answer["diodes"]) == (2, 3, "row2col")
     assert (answer["circuit"]["line_pf"], answer["circuit"]["switch_ohm"]) == (60, 200)
     assert answer["skin"]["settle_us"]["enough"]
     assert not answer["skin"]["release_us"]["enough"]  # a keeper of 100 kilohms
@@ -122,11 +113,6 @@ def test_bad_values_are_refused(capsys, options, message):
     assert message in capsys.readouterr().err
 
 
-def test_thresholds_that_are_not_in_order(capsys):
-    assert cli.main([*SMALL, "--low-v", "2.5"]) == 1
-    assert "VIL must lie below VIH" in capsys.readouterr().err
-
-
 def test_a_skin_without_diodes(capsys, tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text('diodes = "none"\nconnectivity = 4\n')
@@ -134,12 +120,12 @@ def test_a_skin_without_diodes(capsys, tmp_path):
     assert "diodes is 'none'" in capsys.readouterr().err
 
 
-SCANNED = Skin(rows=5, columns=5, precharge_us=1.0, settle_us=5.0, guard=True)
+SCANNED = Skin(rows=3, columns=3, precharge_us=1.0, settle_us=5.0, guard=True)
 
 
 def test_guard_lines_count_as_lines_in_every_answer(tmp_path, capsys):
-    """A time that is enough for 5x5 lines is not enough for 5x5 with guard lines, which are those of 6x6."""
-    bare, guarded = (needed(Circuit(), size, size).settle.us(1.3) for size in (5, 6))
+    """A time that is enough for 3x3 lines is not enough for 3x3 with guard lines, which are those of 4x4."""
+    bare, guarded = (needed(Circuit(), size, size).settle.us(1.3) for size in (3, 4))
     assert bare < guarded
     skin = SCANNED.replace(settle_us=bare)
     check_times(Circuit(), skin.replace(guard=False))
@@ -149,6 +135,6 @@ def test_guard_lines_count_as_lines_in_every_answer(tmp_path, capsys):
     path.write_text(skin.to_toml())
     assert cli.main(["settle", "--skin", str(path)]) == UNSOLVED
     said = capsys.readouterr().out
-    assert said.startswith("5x5 and guard lines, col2row")
+    assert said.startswith("3x3 and guard lines, col2row")
     assert f"the Skin's settle_us = {bare:g}: too short, {guarded:.2f} needed" in said
     assert buildable.proposed(BOARDS["ulx3s-12f"], skin, Circuit())["settle_us"] == guarded

@@ -71,11 +71,6 @@ def test_a_circuit_that_cannot_be_is_refused(skin_file, old, new, message):
     assert message in str(caught.value)
 
 
-def test_a_skin_without_diodes_states_no_circuit():
-    with pytest.raises(CircuitError, match="diodes is 'none'"):
-        check(Circuit(), Skin(diodes="none", connectivity=4))
-
-
 @pytest.mark.parametrize(
     "command", [["build", "icebreaker", "--skin", "FILE"], ["board", "--skin", "FILE"], ["zones", "sim://?skin=FILE"]]
 )

@@ -43,8 +43,8 @@ def test_flush_faces_take_the_stress_on_them(thickness, side):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 8.0, 9.0))])
-@pytest.mark.parametrize("stiffness", [math.inf, 4.0, 2.0])
+@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 9.0))])
+@pytest.mark.parametrize("stiffness", [math.inf, 2.0])
 def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
     """The largest force, on which it depends whether a touch is felt, is off by at most an eighth."""
     foam, sheet = FoamOnCaps(thickness, side, stiffness=stiffness), cells(capped(thickness, side, stiffness))
@@ -52,13 +52,6 @@ def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
         exact, found = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)), sheet.forces_n(finger(x, y))
         assert found.max() == pytest.approx(exact.max(), rel=0.125)
         assert found.sum() == pytest.approx(2.0, rel=1e-5)
-
-
-def test_a_switch_that_gives_way_beside_a_flush_base_loses_its_force():
-    """Why only proud caps may give way: of what a rigid flush cap takes, one on 4 N/mm keeps less than half."""
-    pressed = [FoamOnCaps(5.0, 8.0, stiffness=k, proud=False) for k in (math.inf, 4.0)]
-    rigid, soft = (foam.forces(foam.ellipse(45, 45, 7, 6, 2.0)).max() for foam in pressed)
-    assert soft < 0.45 * rigid
 
 
 # ---- against closed forms
@@ -93,13 +86,6 @@ def test_cut_foam_hands_each_tile_the_pressure_on_it():
     assert sheet.forces_n(finger(40, 40))[3:5, 3:5] == pytest.approx(np.full((2, 2), 0.5), abs=1e-9)
 
 
-def test_the_nearest_proud_cap_takes_a_quarter_at_least_whatever_the_foam():
-    """By symmetry four caps share what lies between them; nothing else can carry it."""
-    for thickness in (1.0, 2.0, 5.0):
-        for side in (6.0, 9.0):
-            assert cells(capped(thickness, side)).forces_n(finger(40, 40)).max() == pytest.approx(0.5, rel=0.06)
-
-
 # ---- what must only rise, and what must not matter
 
 
@@ -111,16 +97,6 @@ def test_forces_add_up_and_scale(x, y, thickness, cut, travel):
     assert sheet.forces_n(one + two) == pytest.approx(sheet.forces_n(one) + sheet.forces_n(two), abs=1e-9)
     assert sheet.forces_n(finger(x, y, 6.0)) == pytest.approx(2 * sheet.forces_n(one), abs=1e-9)
     assert sheet.forces_n(one).sum() == pytest.approx(3.0, rel=5e-3)  # foam near the edge passes some on beyond it
-
-
-def test_more_force_closes_no_fewer_switches_and_thresholds_no_more():
-    closed = [cells(capped(2.0, 8.0)).closed(finger(42, 43, force)) for force in (2, 4, 8, 16, 40)]
-    for fewer, more in itertools.pairwise(closed):
-        assert not (fewer & ~more).any()
-    covers = [Cover("frictionless", 2e-3, Switch(force), cap=Cap(8e-3)) for force in (2, 1, 0.3)]
-    heavy = [cells(cover).closed(finger(42, 43, 9)) for cover in covers]
-    for fewer, more in itertools.pairwise(heavy):
-        assert not (fewer & ~more).any()
 
 
 @pytest.mark.parametrize("swap", [True, False])

@@ -14,20 +14,16 @@ from contactfpga.design.cover import (
     CoverError,
     Ellipse,
     Load,
-    NoSolution,
     Rectangle,
     Switch,
     hertz,
+    hertz_layer,
     medium,
     point,
 )
 
 SWITCH = Switch(force_n=1.0, area_m2=12.6e-6)
 BALL = Ball(radius_m=0.038, modulus_pa=4.6e5)
-
-
-def test_stress_that_closes_a_switch():
-    assert SWITCH.closing_pa == pytest.approx(79365.079, abs=5e-4)
 
 
 # ---- a point force: reference values, to their printed digits
@@ -54,18 +50,6 @@ def test_reach_of_a_force(newtons, millimeters):
     assert round(point.reach_m(SWITCH, newtons, 5e-3) * 1e3, 4) == millimeters
 
 
-def test_best_thickness():
-    offset = 5e-3 * math.sqrt(2)
-    best = point.best_thickness_m(offset)
-    assert round(best * 1e3, 4) == 8.6603
-    assert round(point.LEAST, 6) == 11.266052
-    least = point.least_force_n(SWITCH, offset)
-    assert round(least, 4) == 44.7066
-    around = [point.force_n(SWITCH, offset, best * factor) for factor in (0.98, 1.0, 1.02)]
-    assert around[1] == pytest.approx(least, rel=1e-9)
-    assert min(around[0], around[2]) > least * (1 + 1e-5)
-
-
 @pytest.mark.parametrize(
     ("ratio", "bonded", "frictionless"),
     [(0, 1.571, 1.723), (0.4, 1.443, 1.629), (0.8, 1.041, 1.300), (1, 0.758, 1.029), (1.414, 0.190, 0.291)],
@@ -74,43 +58,6 @@ def test_layers_over_the_half_space(ratio, bonded, frictionless):
     for name, expected in (("bonded", bonded), ("frictionless", frictionless)):
         for spread in (medium.spread, medium.exact_spread):
             assert round(float(spread(name, ratio) / medium.spread("halfspace", ratio)), 3) == expected
-
-
-def test_where_a_layer_is_pulled_off_the_switch():
-    assert round(medium.first_zero("bonded"), 3) == 1.671
-    assert round(medium.first_zero("frictionless"), 3) == 1.566
-    assert medium.first_zero("halfspace") is None
-    answer = point.force_n(SWITCH, 1.68 * 5e-3, 5e-3, "bonded")
-    assert isinstance(answer, NoSolution)
-    assert str(answer) == (
-        "no solution: a switch 8.4 mm from the force is 1.68 thicknesses of the cover away; from 1.671 on a point "
-        "force on a bonded layer does not press it"
-    )
-    assert point.force_n(SWITCH, 1.66 * 5e-3, 5e-3, "bonded") > 1000
-    assert isinstance(point.force_n(SWITCH, 1.6 * 5e-3, 5e-3, "frictionless"), NoSolution)
-    assert point.force_n(SWITCH, 1.68 * 5e-3, 5e-3) < 200
-
-
-def test_the_prototype_under_a_bonded_layer():
-    assert round(point.force_n(SWITCH, 1.414 * 5e-3, 5e-3, "bonded")) == 340
-    assert round(point.force_n(SWITCH, math.sqrt(2) * 5e-3, 5e-3, "bonded")) == 341
-
-
-def test_beyond_the_second_zero_a_layer_presses_by_less_than_it_is_said():
-    ratios = np.linspace(1.9076, medium.FARTHEST, 400)
-    far = medium.exact_spread("bonded", ratios) / medium.exact_spread("bonded", 0)
-    assert far[0] == pytest.approx(0, abs=1e-6)
-    assert 0.0028 < far.max() < 0.0029
-    assert (far[5:] > 0).all()
-
-
-@pytest.mark.parametrize("within", medium.MEDIA)
-def test_a_force_too_small_for_any_switch(within):
-    below = point.force_n(SWITCH, 0.0, 5e-3, within)
-    answer = point.reach_m(SWITCH, 0.99 * below, 5e-3, within)
-    assert isinstance(answer, NoSolution)
-    assert f"that takes {below:.4g} N" in answer.reason
-    assert point.reach_m(SWITCH, 1.0001 * below, 5e-3, within) < 1e-3
 
 
 @given(
@@ -126,14 +73,6 @@ def test_reach_undoes_force(ratio, thickness, newtons, within):
 
 
 # ---- the media
-
-
-@pytest.mark.parametrize("within", medium.MEDIA)
-def test_all_of_the_force_arrives(within):
-    s = np.linspace(0, medium.FARTHEST, 64001)
-    arrived = integrate.simpson(medium.spread(within, s) * 2 * np.pi * s, x=s)
-    missing = (1 + medium.FARTHEST**2) ** -1.5 if within == "halfspace" else 0.0
-    assert arrived == pytest.approx(1 - missing, abs=1e-5)
 
 
 @pytest.mark.parametrize("base", ["bonded", "frictionless"])
@@ -162,12 +101,6 @@ def test_transfer_against_the_boundary_problem(base, t):
     assert medium.transfer(base, np.array([t]))[0] == pytest.approx(normal(t) @ coefficients, rel=1e-7)
 
 
-def test_transfer_of_very_long_and_very_short_waves():
-    for name in medium.MEDIA:
-        assert medium.transfer(name, np.array([0.0]))[0] == 1
-        assert medium.transfer(name, np.array([500.0]))[0] == pytest.approx(0, abs=1e-100)
-
-
 @pytest.mark.parametrize("within", ["bonded", "frictionless"])
 def test_spread_against_scipys_bessel_function(within):
     for s in (0.0, 0.3, 1.2, 1.671, 2.7, 6.0, 15.0):
@@ -178,17 +111,7 @@ def test_spread_against_scipys_bessel_function(within):
         assert float(medium.spread(within, s)) == pytest.approx(whole / (2 * np.pi), abs=1e-7)
 
 
-def test_a_layers_stress_counts_as_none_far_away():
-    assert medium.spread("bonded", [medium.FARTHEST, 100.0]).tolist() == [0, 0]
-    assert medium.spread("bonded", medium.FARTHEST - 1e-9) < 1e-7 * medium.spread("bonded", 0.0)
-
-
 # ---- the Hertz patch
-
-
-def test_a_balls_patch():
-    assert round(BALL.patch_m(12) * 1e3, 4) == 9.0592
-    assert round(BALL.indentation_m(12) * 1e3, 4) == 2.1597
 
 
 @pytest.mark.parametrize(("offset_mm", "pascals"), [(0, 53513), (4, 45636), (12, 5209)])
@@ -196,50 +119,20 @@ def test_stress_below_a_patch(offset_mm, pascals):
     assert round(float(hertz.stress_pa(12, BALL.patch_m(12), offset_mm * 1e-3, 5e-3))) == pascals
 
 
-def test_force_that_closes_the_switch_below_a_ball():
-    assert round(Ball(0.019, 4.6e5).closing_n(SWITCH, 5e-3), 2) == 13.41
-    assert round(BALL.closing_n(SWITCH, 5e-3), 2) == 28.36
-    assert Ball(1e-9, 4.6e5).closing_n(SWITCH, 5e-3) == pytest.approx(point.force_n(SWITCH, 0, 5e-3), rel=1e-4)
-
-
-def test_a_small_patch_is_a_point_and_a_shallow_switch_feels_the_pressure():
-    offsets = np.linspace(0, 0.03, 31)
-    small = hertz.stress_pa(10, 1e-6, offsets, 5e-3)
-    assert small == pytest.approx(point.stress_pa(10, offsets, 5e-3), rel=1e-6)
-    patch = 0.01
-    inside = np.array([0, 0.003, 0.006, 0.009])
-    pressure = 1.5 * 10 / (np.pi * patch**2) * np.sqrt(1 - (inside / patch) ** 2)
-    assert hertz.stress_pa(10, patch, inside, 1e-7) == pytest.approx(pressure, rel=1e-4)
-    assert hertz.stress_pa(10, patch, 0.02, 1e-7) == pytest.approx(0, abs=1)
-
-
 # ---- which switches close
 
 
-def test_models_are_superposed_to_the_accuracy_that_is_stated():
-    x = np.linspace(0, 0.08, 161)
-    for radius, depth in ((0.002, 0.005), (0.012, 0.005), (0.03, 0.005), (0.012, 0.001)):
-        closed_form = hertz.stress_pa(10, radius, x, depth)
+@pytest.mark.parametrize("model", ["hertz", "bonded", "frictionless"])
+def test_models_are_superposed_to_the_accuracy_that_is_stated(model):
+    """Against the integral over waves, which test_cover_sense.py compares with scipy's."""
+    x = np.linspace(0, 0.035, 36)
+    for radius, depth in ((0.002, 0.005), (0.012, 0.005), (0.03, 0.005), (0.009, 0.005)):
+        within = "halfspace" if model == "hertz" else model
+        exact = np.array([hertz_layer.stress_pa(10, radius, offset, depth, within) for offset in x.tolist()])
         # An ellipse that is hardly one goes the long way.
         ellipse = Ellipse(radius, radius * (1 + 1e-12))
-        stress = Cover("hertz", depth).stress_pa([Load((ellipse,), 10)], x, 0 * x)
-        assert np.abs(stress - closed_form).max() < 5e-4 * closed_form[0]
-
-
-@pytest.mark.parametrize("model", ["bonded", "frictionless"])
-def test_a_patch_on_a_layer_against_its_hankel_transform(model):
-    radius, depth = 0.009, 0.005
-    load = [Load((Ellipse(radius, radius),), 12.0)]
-    for offset in (0.0, 0.004, 0.012, 0.02):
-
-        def wave(k, offset=offset):
-            ka = k * radius
-            pressure = 3 * (np.sin(ka) - ka * np.cos(ka)) / ka**3 if ka > 1e-3 else 1 - ka**2 / 10
-            return k * pressure * medium.transfer(model, k * depth) * special.j0(k * offset)
-
-        whole = 12 / (2 * np.pi) * integrate.quad(wave, 0, 45 / depth, limit=800)[0]
-        found = Cover(model, depth).stress_pa(load, np.array(offset), np.array(0.0))
-        assert float(found) == pytest.approx(whole, abs=20)
+        stress = Cover(model, depth).stress_pa([Load((ellipse,), 10)], x, 0 * x)
+        assert np.abs(stress - exact).max() < 5e-4 * exact[0]
 
 
 def test_a_wide_flat_patch_passes_its_pressure_on():
@@ -288,14 +181,6 @@ def test_point_model_closes_a_disc_as_wide_as_the_reach():
     assert closed.any()
 
 
-def test_closed_switches_are_no_contact_area():
-    # A ball pressed with 12 N touches a disc of 9 mm radius and closes nothing; with 28.4 N one switch closes.
-    for model_force, count in ((12.0, 0), (28.3, 0), (28.4, 1)):
-        load = [Load((Ellipse(*2 * (BALL.patch_m(model_force),)),), model_force)]
-        x = np.arange(-4, 5) * 0.01
-        assert Cover("hertz", 5e-3, SWITCH).closed(load, x, x[:, None]).sum() == count
-
-
 def test_share_of_a_switchs_face():
     half = Rectangle(0.05, 0.05, x_m=0.05)  # covers all places with x above 0
     face = Switch(area_m2=4e-6)  # 2 mm by 2 mm
@@ -320,21 +205,14 @@ def test_no_contact_closes_nothing():
     ("make", "message"),
     [
         (lambda: Switch(force_n=0), r"force_n is 0; it must be a finite number above 0 N"),
-        (lambda: Switch(area_m2=math.nan), r"area_m2 is nan; it must be a finite number above 0 m2"),
-        (lambda: Ball(-1.0, 1e5), r"radius_m is -1.0; it must be a finite number above 0 m"),
-        (lambda: Ball(0.02, 4e5).patch_m(0.0), r"force_n is 0.0; it must be a finite number above 0 N"),
         (lambda: Cover("rubber"), r"model is 'rubber'; it must be one of patch, point, hertz, bonded, frictionless"),
         (lambda: Cover(thickness_m=0), r"thickness_m is 0; it must be a finite number above 0 m"),
         (lambda: Cover(share=1.5), r"share is 1.5; it must lie above 0 and not above 1"),
         (lambda: Cover("point", share=0.5), r"share is 0.5; the model 'point' goes by stress, leave it out"),
         (lambda: Cover().stress_pa([], np.zeros(1), np.zeros(1)), r"'patch' knows no stress; take one of point, hertz"),
         (lambda: Load((Ellipse(1, 1),), -2.0), r"force_n is -2.0; it must be a finite number, 0 N or above"),
-        (lambda: Ellipse(0.01, 0.0), r"half_y_m is 0.0; it must be a finite number above 0 m"),
-        (lambda: Rectangle(0.01, 0.01, x_m=math.inf), r"x_m is inf; it must be a finite number"),
         (lambda: Rectangle(0.01, 0.01, x_m="3"), r"x_m is '3'; it must be a finite number"),
         (lambda: medium.spread("sand", 1.0), r"medium is 'sand'; it must be one of halfspace, bonded, frictionless"),
-        (lambda: point.force_n(SWITCH, -0.1, 5e-3), r"offset_m is -0.1; it must be a finite number, 0 m or above"),
-        (lambda: point.reach_m(SWITCH, math.inf, 5e-3), r"force is inf; it must be a finite number above 0 N"),
         (lambda: hertz.stress_pa(-1.0, 0.01, 0.0, 0.005), r"force_n is -1.0; it must be a finite number, 0 N or above"),
     ],
 )

@@ -7,7 +7,6 @@ import pytest
 from impacts import FIRST, ROWS, SPEED, arm, spring
 
 from contactfpga.design.cover import Ball, elastic, impact
-from contactfpga.design.cover.arm import Arm
 
 # ---- reference values, to their printed digits
 
@@ -48,11 +47,6 @@ def test_stiffness_for_a_time(seconds, millimeters, stiffness):
     assert searched.stiffness == pytest.approx(found.stiffness, rel=1e-10)
 
 
-def test_constant_of_the_closed_form():
-    assert round(impact.COMPRESSION_TIME, 9) == 1.471637592
-    assert float(mpmath.mpf(2) / 5 * mpmath.beta(0.4, 0.5)) == pytest.approx(impact.COMPRESSION_TIME, rel=1e-15)
-
-
 @pytest.mark.parametrize(("radius", "millimeters"), [(0.019, 26.873381), (0.038, 15.434704)])
 def test_thickness_as_printed(radius, millimeters):
     found = elastic.thickness_m(Ball(radius, 4.6e5), 2.0, 1.5, 4791.0)
@@ -81,16 +75,7 @@ def test_yield():
     ball = Ball(1.0, 4.6e5)
     assert round(elastic.yield_indentation_m(ball, 57.5e3), 5) == 0.10496
     assert round(elastic.yield_indentation_m(ball, 57.5e3, elastic.CYLINDER_ON_PLANE), 5) == 0.19518
-    # the printed strength: 20 to 74 radii deep, which no contact reaches
-    vacuous = [
-        elastic.yield_indentation_m(Ball(1.0, elastic.effective_modulus_pa(modulus, poisson)), 8.41e5, ratio)
-        for modulus in (3.45e5, 3.65e5)
-        for poisson in (0.5, 0.0)
-        for ratio in (1.1, 1.5)
-    ]
-    assert (round(min(vacuous)), round(max(vacuous))) == (20, 74)
     assert elastic.resilience(57.5e3, 3.45e5) == pytest.approx(4791, abs=1)
-    assert elastic.resilience(8.41e5, 3.45e5) == pytest.approx(1.025e6, rel=1e-3)
 
 
 def test_yield_is_where_the_mean_pressure_is_the_strength_times_its_ratio():
@@ -103,15 +88,6 @@ def test_yield_is_where_the_mean_pressure_is_the_strength_times_its_ratio():
 # ---- limits
 
 
-def test_a_vanishing_torque_and_weight_change_nothing():
-    free = impact.strike(arm(), SPEED, FIRST)
-    for moved in (arm(torque_nm=1e-9), arm(torque_nm=-1e-9), Arm(arm().inertia_kgm2, 0.2, 0.0, 1e-9, 1.0)):
-        found = impact.strike(moved, SPEED, FIRST)
-        assert found.method == "quadrature"
-        assert found.compression_m == pytest.approx(free.compression_m, rel=1e-8)
-        assert found.time_s == pytest.approx(free.time_s, rel=1e-8)
-
-
 def test_without_speed_the_torque_alone_presses():
     # u delta/d = 2/5 K delta^2.5, and with delta = delta_c x^(2/3): t_c is a Beta function again
     pressed = impact.strike(arm(torque_nm=2.0), 0.0, FIRST)
@@ -120,14 +96,6 @@ def test_without_speed_the_torque_alone_presses():
     scale = math.sqrt(depth * arm().mass_kg / (2 * 10))
     expected = float(mpmath.beta(mpmath.mpf(1) / 3, 0.5) * 2 / 3) * scale
     assert pressed.time_s == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("speed", [1e-2, 1e-4, 1e-6, 1e-9])
-def test_a_slow_touch_under_a_strong_torque_comes_near_that(speed):
-    pressed = impact.strike(arm(torque_nm=20.0), 0.0, FIRST)
-    found = impact.strike(arm(torque_nm=20.0), speed, FIRST)
-    assert found.time_s == pytest.approx(pressed.time_s, abs=1.1 * speed * arm().mass_kg / 100)
-    assert found.time_s < pressed.time_s
 
 
 def test_modulus_of_an_incompressible_foam_and_of_two_bodies():

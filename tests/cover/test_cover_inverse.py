@@ -1,7 +1,5 @@
 """What arm and cover give a certain force, and where there is none."""
 
-import math
-
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -33,21 +31,6 @@ def test_stiffness_undoes_time(inertia, lever, speed, stiffness, torque, weight,
         assert back.compression_m == pytest.approx(hit.compression_m, rel=1e-8)
 
 
-@settings(deadline=None)
-@given(between(-3, 1), between(2, 8))
-def test_stiffness_undoes_time_in_closed_form(speed, stiffness):
-    hit = impact.strike(arm(), 10**speed, 10**stiffness)
-    assume(isinstance(hit, Impact))
-    assert impact.stiffness_for(arm(), 10**speed, hit.time_s).stiffness == pytest.approx(10**stiffness, rel=1e-12)
-
-
-@given(between(-10, 10), between(2.5, 8), between(0.01, 1))
-def test_a_stiffer_contact_is_shorter(torque, stiffness, more):
-    hits = [impact.strike(arm(torque_nm=torque), SPEED, 10**k) for k in (stiffness, stiffness + more)]
-    assume(all(isinstance(hit, Impact) for hit in hits))
-    assert hits[0].time_s > hits[1].time_s
-
-
 # ---- no solution, and why
 
 
@@ -55,16 +38,8 @@ def test_a_stiffer_contact_is_shorter(torque, stiffness, more):
     ("ask", "reason"),
     [
         (
-            lambda: impact.strike(arm(torque_nm=100.0), SPEED, 1e3),
-            "the torque wins: without any speed it presses the foam in by 630 mm, the lever's length is 200 mm",
-        ),
-        (
             lambda: impact.strike(arm(torque_nm=20.0), SPEED, FIRST, thickness_m=0.005),
             "the torque wins: without any speed it presses the foam in by 10.77 mm, the foam's thickness is 5 mm",
-        ),
-        (
-            lambda: impact.strike(arm(), SPEED, FIRST, thickness_m=0.003),
-            "the foam bottoms out: pressed in by 3.78 mm, it is 3 mm thick",
         ),
         (
             lambda: impact.strike(arm(), SPEED, 1.0),
@@ -81,11 +56,6 @@ def test_a_stiffer_contact_is_shorter(torque, stiffness, more):
         (
             lambda: impact.stiffness_for(arm(torque_nm=-1.0), SPEED, 0.0315),
             "a compression of 31.5 ms: torque and gravity stop the arm within 31.43 ms whatever the foam",
-        ),
-        (
-            lambda: impact.stiffness_for(arm(torque_nm=1.0), SPEED, 0.6),
-            "a compression of 600 ms: the foam would be pressed in by more than the lever's length, 200 mm; "
-            "that takes 216.9 ms",
         ),
         (
             lambda: impact.stiffness_for(arm(), SPEED, 0.008, thickness_m=0.002),
@@ -116,29 +86,20 @@ def test_a_wide_turn_is_noted():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Arm(0.0, 0.2), "inertia_kgm2 is 0.0; it must be a finite number above 0 kg m2"),
         (lambda: Arm(0.1, -0.2), "lever_m is -0.2; it must be a finite number above 0 m"),
-        (lambda: Arm(0.1, 0.2, math.nan), "torque_nm is nan; it must be a finite number"),
         (lambda: Arm(0.1, 0.2, "2"), "torque_nm is '2'; it must be a finite number"),
         (lambda: Arm(0.1, 0.2, 0.0, -1.0), "weight_nm is -1.0; it must be a finite number, 0 Nm or above"),
-        (lambda: Arm.link(0, 0.038, 0.15, 0.2), "mass_kg is 0; it must be a finite number above 0 kg"),
-        (lambda: arm(length_m=math.inf), "length_m is inf; it must be a finite number above 0 m"),
-        (lambda: impact.strike(arm(), -1.0, FIRST), "speed_m_s is -1.0; it must be a finite number, 0 m/s or above"),
-        (lambda: impact.strike(arm(), 1.0, 0.0), "stiffness is 0.0; it must be a finite number above 0 N/m^1.5"),
         (lambda: impact.strike(arm(), 1.0, 1.0, method="euler"), "must be one of auto, closed, quadrature, ode"),
         (
             lambda: impact.strike(arm(torque_nm=1.0), 1.0, 1e5, method="closed"),
             "method is 'closed'; with torque or gravity there is no closed form, take 'quadrature'",
         ),
-        (lambda: impact.stiffness_for(arm(), 0.4, 0.0), "seconds is 0.0; it must be a finite number above 0 s"),
         (lambda: impact.strike(arm(), 0.4, FIRST, thickness_m=0), "thickness_m is 0; it must be a finite number"),
         (lambda: motion.steps(arm(), 0.4, FIRST, 1.0), "rtol is 1.0; it must lie between 1e-13 and 0.01"),
-        (lambda: elastic.effective_modulus_pa(1e5, 0.6), "poisson is 0.6; it must lie above -1 and not above 0.5"),
         (
             lambda: elastic.thickness_m(Ball(0.02, 1e5), 1, 1, 1, rule="best"),
             "rule is 'best'; it must be one of printed",
         ),
-        (lambda: elastic.resilience(-1, 1e5), "yield_pa is -1; it must be a finite number above 0 Pa"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

@@ -132,9 +132,7 @@ def test_what_no_reaction_saves_and_what_needs_none():
         (TABLE + "more = 1\n", "more"),
         (TABLE.replace("mass_kg = 2.0\n", ""), "mass_kg is missing"),
         (TABLE.replace("120.0", "nan"), "transient_n is nan"),
-        (TABLE.replace("120.0", "-1"), "transient_n is -1"),
         (TABLE.replace("120.0", "1e300"), "transient_n is 1e\\+300"),
-        (TABLE.replace("2.0", '"two"'), "mass_kg is 'two'"),
         (101 * TABLE, "at most 100"),
     ],
 )

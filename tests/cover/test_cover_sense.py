@@ -1,6 +1,7 @@
 """Sensitivity: models by name, the simplest one that will do, patches on layers, pitch and thickness, refusals."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from contactfpga.design.cover import Ball, CoverError, NoSolution, Switch, hertz, hertz_layer, medium, point, sense
+from contactfpga.design.cover import Ball, CoverError, NoSolution, Switch, hertz_layer, medium, point, sense
 from contactfpga.design.cover.sense import Model, PaddedSheet
 
 SWITCH = Switch(1.0, 12.6e-6)
@@ -17,38 +18,6 @@ SMALL = Ball(2e-3, 1e6)
 HALFSPACE, BONDED, SLIDING = (Model(name, "point") for name in medium.MEDIA)
 PATCHES = [Model(name, "patch") for name in medium.MEDIA]
 WORST = 5e-3 * math.sqrt(2)
-
-
-# ---- reference values through this interface
-
-
-@pytest.mark.parametrize(
-    ("offset_mm", "thickness_mm", "newtons", "digits"),
-    [(0, 5, 4.15555, 5), (5 * math.sqrt(2), 5, 64.7785, 4), (5 * math.sqrt(2), 10, 45.8054, 4), (0, 10, 16.622, 3)],
-)
-def test_half_space_by_name(offset_mm, thickness_mm, newtons, digits):
-    found = PaddedSheet(SWITCH, thickness_mm * 1e-3).detects(offset_mm * 1e-3, HALFSPACE)
-    assert round(found.value, digits) == newtons
-    assert (found.model, found.dropped) == (HALFSPACE, ("the rigid base",))
-
-
-@pytest.mark.parametrize(
-    ("newtons", "millimeters"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783)]
-)
-def test_reach_by_name(newtons, millimeters):
-    assert round(1e3 * PaddedSheet(SWITCH, 5e-3).reaches(newtons, HALFSPACE).value, 4) == millimeters
-
-
-def test_the_papers_definition():
-    reach = PaddedSheet(SWITCH, 5e-3).reaches(15, HALFSPACE).value
-    assert round(1e3 * sense.pitch_m(reach), 3) == 5.792
-    assert sense.worst_offset_m(0.01) == pytest.approx(WORST)
-    assert sense.worst_offset_m(0.006, 0.008) == pytest.approx(0.005)
-
-
-def test_on_axis_forces():
-    assert round(PaddedSheet(SWITCH, 5e-3, Ball(0.019, 4.6e5)).force_n(PATCHES[0], 0.0), 2) == 13.41
-    assert round(PaddedSheet(SWITCH, 5e-3, PAPERS).force_n(PATCHES[0], 0.0), 2) == 28.36
 
 
 # ---- the model that is taken
@@ -106,21 +75,14 @@ def test_the_answer_is_within_the_tolerance_whatever_model_gives_it(ball):
     assert len(taken) >= 2
 
 
-def test_reach_takes_the_simplest_model_too():
-    sheet = PaddedSheet(SWITCH, 5e-3)
-    found = sheet.reaches(15.0)
-    assert (found.model, abs(found.error) < 0.05) == (HALFSPACE, True)
-    assert sheet.reaches(300.0).model == BONDED
-
-
 def test_past_the_zero_no_force_closes_the_switch():
+    assert round(medium.first_zero("bonded"), 3) == 1.671
+    assert round(medium.first_zero("frictionless"), 3) == 1.566
+    assert point.force_n(SWITCH, 1.66 * 5e-3, 5e-3, "bonded") > 1000
     for ball in (None, PAPERS):
         found = PaddedSheet(SWITCH, 5e-3, ball).detects(1.68 * 5e-3)
         assert isinstance(found.value, NoSolution)
-        assert (
-            "1.68 thicknesses away" in found.value.reason
-            or "is 1.68 thicknesses of the cover away" in found.value.reason
-        )
+        assert re.search("1.68 thicknesses (of the cover )?away", found.value.reason)
         assert "from 1.671 on a point force on a bonded layer does not press it" in found.value.reason
     named = PaddedSheet(SWITCH, 5e-3).detects(1.68 * 5e-3, HALFSPACE)
     assert named.value < 200
@@ -152,11 +114,6 @@ def test_patch_on_a_layer_against_scipys_integral(within, wide, away):
     assert found == pytest.approx(whole / (2 * math.pi), abs=1e-8)
 
 
-def test_patch_on_a_half_space_is_hubers():
-    found = hertz_layer.stress_pa(12, 9e-3, 4e-3, 5e-3, "halfspace")
-    assert found == float(hertz.stress_pa(12, 9e-3, 4e-3, 5e-3))
-
-
 @pytest.mark.parametrize("model", PATCHES)
 @pytest.mark.parametrize("offset", [0.0, 2e-3, 6e-3])
 def test_the_switch_just_closes_under_the_force_that_is_found(model, offset):
@@ -164,12 +121,6 @@ def test_the_switch_just_closes_under_the_force_that_is_found(model, offset):
     for share, closed in ((1 - 1e-9, False), (1 + 1e-9, True)):
         stress = hertz_layer.stress_pa(share * force, PAPERS.patch_m(share * force), offset, 5e-3, model.within)
         assert (stress >= SWITCH.closing_pa) is closed
-
-
-def test_a_small_ball_is_a_point():
-    for model in PATCHES:
-        found = PaddedSheet(SWITCH, 5e-3, Ball(1e-7, 1e9)).force_n(model, 3e-3)
-        assert found == pytest.approx(point.force_n(SWITCH, 3e-3, 5e-3, model.within), rel=1e-5)
 
 
 @settings(deadline=None, max_examples=40)
@@ -195,12 +146,12 @@ def test_reach_undoes_force(model, radius, modulus, ratio, thickness, newtons):
 def test_best_thickness():
     assert 1 / sense.best_ratio() == pytest.approx(math.sqrt(1.5))
     assert sense.best_thickness_m(WORST) == pytest.approx(point.best_thickness_m(WORST))
+    assert point.least_force_n(SWITCH, WORST) == pytest.approx(44.7066, abs=1e-4)
     for name in medium.MEDIA:
         best = sense.best_thickness_m(WORST, name)
         least = point.force_n(SWITCH, WORST, best, name)
         for share in (0.97, 0.99, 1.01, 1.03):
             assert point.force_n(SWITCH, WORST, share * best, name) > least
-    assert point.force_n(SWITCH, WORST, point.best_thickness_m(WORST)) == pytest.approx(44.7066, abs=1e-4)
 
 
 # ---- refusals
@@ -230,16 +181,10 @@ def test_a_ball_too_soft_for_any_model():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: PaddedSheet(SWITCH, 0.0), "thickness_m is 0.0; it must be a finite number above 0 m"),
-        (
-            lambda: PaddedSheet(SWITCH, 5e-3).detects(-1e-3),
-            "offset_m is -0.001; it must be a finite number, 0 m or above",
-        ),
         (
             lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, tolerance=0.0),
             "tolerance is 0.0; it must be a finite number above 0",
         ),
-        (lambda: PaddedSheet(SWITCH, 5e-3).reaches(math.nan), "force is nan; it must be a finite number above 0 N"),
         (
             lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "patch")),
             "model is 'bonded, patch'; a patch needs the radius R* and the modulus E* of the contact",
@@ -252,8 +197,6 @@ def test_a_ball_too_soft_for_any_model():
             lambda: PaddedSheet(SWITCH, 5e-3).detects(0.0, Model("bonded", "foot")),
             "contact is 'foot'; it must be one of point, patch",
         ),
-        (lambda: sense.worst_offset_m(0.0), "pitch_x_m is 0.0; it must be a finite number above 0 m"),
-        (lambda: sense.best_thickness_m(0.0), "offset_m is 0.0; it must be a finite number above 0 m"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

@@ -67,13 +67,6 @@ def test_a_window_of_a_large_sheet_takes_what_the_whole_sheet_does():
     assert found.median_share == pytest.approx(np.median(peaks), rel=1e-5)
 
 
-def test_a_finger_on_a_tile_of_its_own_is_felt_at_the_switch_s_force():
-    found = feel(tiles(0.7), Sheet(5, 5, 10e-3, 10e-3), 4e-3, 4e-3, places=400)
-    assert found.half.value_n == pytest.approx(0.7)
-    assert found.worst.value_n == pytest.approx(4 * 0.7, rel=0.3)  # between four
-    assert found.worst.value_n <= 4 * 0.7 + 1e-9
-
-
 def test_places_fill_the_sheet_evenly():
     """Each sixteenth of the sheet gets its share of them, and each quarter of the angles."""
     x, y, angle = spread_evenly(1600, SHEET).T
@@ -98,12 +91,6 @@ def test_forces_of_drawn_sheets_lie_in_the_interval():
     assert feel(tiles(0.5), SHEET, places=50).sheets == 1
 
 
-def test_twice_the_closing_force_takes_twice_the_force():
-    light, heavy = (feel(tiles(force), SHEET, places=60) for force in (0.4, 0.8))
-    assert heavy.worst.value_n == pytest.approx(2 * light.worst.value_n)
-    assert heavy.least_share == light.least_share
-
-
 def test_fingers_on_absent_switches_are_not_felt():
     mask = tuple(itertools.product(range(SHEET.rows), range(6)))
     assert isinstance(feel(tiles(), Sheet(7, 9, 10e-3, 8e-3, mask), places=60).most, NoSolution)
@@ -118,13 +105,6 @@ def test_on_a_closed_sheet_a_finger_over_the_seam_presses_both_sides():
     opened, closed = (feel(tiles(), sheet, 16e-3, 14e-3, places=300).half for sheet in sheets)
     assert isinstance(opened, NoSolution)
     assert not isinstance(closed, NoSolution)
-
-
-def test_false_presses_are_those_of_the_cells():
-    cover = tiles(0.5, spread=0.2, preload_n=0.1)
-    cells = Cells(cover, SHEET.rows, SHEET.columns, SHEET.pitch_x_m, SHEET.pitch_y_m)
-    found = feel(cover, SHEET, places=1, acceleration_m_s2=500.0, foam_kg_m3=300.0)
-    assert found.false_presses == cells.false_presses(500.0, 300.0) > 0
 
 
 def test_a_bonded_layer_pulls_where_no_force_is_felt():

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from bumpers import flat
+from bumpers import flat, shown
 
 from contactfpga.robot.haptics import (
     Center,
@@ -65,18 +65,8 @@ def test_a_center_of_pressure_lies_from_0_to_the_circumference():
 
 
 def frame(cells, number, report):
-    """Of one zone that leads nowhere round, its columns counted on from the left one."""
-    skin = SKIN.replace(report=report)
-    bitmap = np.zeros((8, COLUMNS), bool)
-    for row, column in cells:
-        bitmap[row, column % COLUMNS] = True
-    past = sum(column >= COLUMNS for _, column in cells) if any(column < COLUMNS for _, column in cells) else 0
-    sums = len(cells), sum(column % COLUMNS for _, column in cells), sum(row for row, _ in cells), past
-    records = np.array([sums] if cells and report == "moments" else [], np.int64).reshape(-1, 4)
-    sent = Frame(number, number, frozenset(), 0, 0, 1, len(cells), records, bitmap if report == "cells" else None)
-    zones = Zones(sent, skin.sheet, 1000 * number)
-    zones._units = UnitSamples(1000 * number, (1.0 + len(cells),) * 3, (0.0,) * 3, (False,) * 3)
-    return zones
+    """One zone, which the units feel the more the larger it is."""
+    return shown(SKIN.replace(report=report), cells, number, 3.0 * (1 + len(cells)))
 
 
 @pytest.mark.parametrize("report", ["moments", "cells"])

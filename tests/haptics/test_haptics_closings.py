@@ -1,46 +1,20 @@
 """Closings from frames: which switch closed, at which push, by exact sums and by cells."""
 
-import dataclasses
-
-import numpy as np
 import pytest
-from bumpers import flat
+from bumpers import flat, shown
 
 from contactfpga.robot.haptics import ClosingWatch, HapticsError, LoadCells, Plane
 from contactfpga.skin import Skin
 
-ROWS = 8
+SKIN = Skin(rows=8, columns=8)
 CELLS = LoadCells(flat().units, surface=Plane())
-
-
-@dataclasses.dataclass
-class Units:
-    readings: tuple[float, ...]
-
-
-class Shown:
-    """A frame of these pressed (row, column), with the sums that a board sends."""
-
-    def __init__(self, pressed, push_n, sequence, bitmap=False, overwritten=0):
-        self.frame = self
-        self.barycenters = None
-        self.sheet = Skin(rows=ROWS, columns=ROWS).sheet
-        self.pressed, self.sequence, self.overwritten = len(pressed), sequence, overwritten
-        rows, columns = (sum(axis) for axis in zip(*pressed)) if pressed else (0, 0)
-        self.records = np.array([[len(pressed), columns, rows]] if pressed else np.zeros((0, 3)), np.int64)
-        self.units = None if push_n is None else Units((push_n / 3,) * 3)
-        self.cells = None
-        if bitmap:
-            self.cells = np.zeros((ROWS, ROWS), bool)
-            for cell in pressed:
-                self.cells[cell] = True
 
 
 def watched(*frames, bitmap=False):
     """A watch after frames of (cells, push)."""
     watch = ClosingWatch(CELLS)
     for sequence, (pressed, push) in enumerate(frames):
-        watch.take(Shown(pressed, push, sequence, bitmap))
+        watch.take(shown(SKIN.replace(report="cells") if bitmap else SKIN, pressed, sequence, push))
     return watch
 
 
@@ -58,7 +32,7 @@ def test_a_switch_that_opens_is_forgotten_and_a_contact_that_ends_all_of_them():
     watch = watched(([], 1.0), ([(2, 3)], 3.0), two, ([(2, 4)], 4.0))
     assert watch.cells == [(2, 4)]
     assert watch.complete
-    watch.take(Shown([], 0.5, 4))
+    watch.take(shown(SKIN, [], 4, 0.5))
     assert (watch.cells, watch.complete) == ([], True)
 
 

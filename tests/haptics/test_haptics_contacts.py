@@ -17,7 +17,7 @@ from bumpers import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga.robot.haptics import Cylinder, HapticsError, contacts
+from contactfpga.robot.haptics import Cylinder, contacts
 from contactfpga.robot.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -38,19 +38,6 @@ def test_one_force_is_found_exactly(seed):
         assert found.interval_n[0] <= found.normal_n <= found.interval_n[1]
         assert found.normal_n == pytest.approx(-force @ normal)
         assert (result.model, result.rank, result.beyond_friction) == (PURE_FORCE, 3, False)
-
-
-@given(SEEDS)
-@settings(max_examples=40, deadline=None)
-def test_two_pushes_without_friction_are_found_exactly(seed):
-    rng = np.random.default_rng(seed)
-    points, normals = scattered(rng, 2)
-    pushes = rng.uniform(0.1, 50, 2)
-    for noise in (None, random_bumper(rng).noise):
-        found = solved(points, normals, exerted(points, -pushes[:, None] * normals, noise))
-        turned = abs((points[0] - points[1]) @ np.cross(*normals)) > 1e-4  # else normals may be a squeeze
-        if turned:
-            assert [one.normal_n for one in found] == pytest.approx(pushes, rel=1e-5)
 
 
 @given(SEEDS)
@@ -109,35 +96,6 @@ def test_covariance_and_chi2_are_those_of_many_trials(count, sigma):
     assert np.sqrt(np.diag(spread)) == pytest.approx(np.sqrt(np.diag(stated)), rel=0.1, abs=2e-3)
 
 
-def test_a_place_that_is_unsure_raises_no_alarm():
-    """Without the place's own spread nearly every frame of a 12 N push would."""
-    rng = np.random.default_rng(2)
-    cells = hexapod(60, 0.075)
-    reach = 3.8e-3
-    alarms = {0.0: 0, reach / 2: 0}
-    for _ in range(300):
-        point, normal = on_cylinder(rng.uniform(0, 360), rng.uniform(0.02, 0.13))
-        off = reach * np.sqrt(rng.random()) * np.array([np.cos(t := rng.uniform(0, 6.3)), np.sin(t)])
-        shown = point + off[0] * np.cross([0, 0, 1], normal) + off[1] * np.array([0, 0, 1.0])
-        six = exerted(point, -12 * normal).array + cells.geometry @ rng.normal(0, 0.05, 6)
-        for sigma in alarms:
-            alarms[sigma] += contacts(wrench(six, cells.noise), [touch(shown, normal, MU, sigma)]).alarm
-    assert alarms[reach / 2] == 0
-    assert alarms[0.0] > 0.85 * 300
-
-
-def test_what_only_the_units_see():
-    """The sheet has one zone; a second push is in the wrench alone."""
-    cells = hexapod(60, 0.075)
-    points, normals = zip(on_cylinder(0, 0.03), on_cylinder(120, 0.12))
-    both = exerted(points, [-12 * normals[0], -6 * normals[1]], cells.noise)
-    seen = contacts(both, [touch(points[0], normals[0], MU, 0.002)])
-    assert seen.alarm
-    assert seen.unexplained is not None
-    clean = exerted(points[0], -12 * normals[0], cells.noise)
-    assert contacts(clean, [touch(points[0], normals[0], MU, 0.002)]).unexplained is None
-
-
 def test_force_without_a_zone():
     cells = hexapod(60, 0.075)
     point, normal = on_cylinder(70, 0.1)
@@ -159,14 +117,6 @@ def test_a_squeeze_is_seen_by_the_sheet_alone():
     assert pushed.unfelt == []
 
 
-def test_normals_on_a_cylinder_have_rank_4_at_most():
-    rng = np.random.default_rng(3)
-    points, normals = scattered(rng, 6)
-    found = solved(points, normals, exerted(points, -rng.uniform(1, 9, 6)[:, None] * normals))
-    assert (found.model, found.rank) == (PURE_FORCE_WITH_KNOWN_DIRECTION, 4)
-    assert np.shape(found.null_space) == (2, 6)
-
-
 def test_three_units_on_a_plane_find_pushes():
     """They see no friction; its forces are not asked."""
     cells = flat()
@@ -177,24 +127,3 @@ def test_three_units_on_a_plane_find_pushes():
     found = contacts(six, [touch(*pair) for pair in zip(points, normals)])
     assert [one.normal_n for one in found] == pytest.approx([5, 9])
     assert (found.model, found.rank, found.freedom) == (PURE_FORCE_WITH_KNOWN_DIRECTION, 2, 1)
-
-
-def test_contacts_at_one_place_are_refused():
-    with pytest.raises(HapticsError, match="contacts 0 and 1 both lie at"):
-        contacts(wrench([1] * 6), [touch((0, 0, 0), (0, 0, 1))] * 2)
-
-
-@pytest.mark.parametrize("sigma", [0.0, 0.002])
-def test_chi2_of_units_that_see_no_friction(sigma):
-    """Three units on a plane: of three components one push takes one."""
-    rng = np.random.default_rng(9)
-    cells, normal = flat(), np.array([0, 0, 1.0])
-    chi2 = []
-    for _ in range(1000):
-        point = np.array([0.02, -0.03, 0.0])
-        moved = point + sigma * rng.standard_normal(3) * [1, 1, 0]
-        six = exerted(moved, -12 * normal).array + cells.geometry @ rng.normal(0, 0.05, 3)
-        found = contacts(wrench(six, cells.noise), [touch(point, normal, 0.5, sigma)])
-        chi2.append(found.chi2)
-    assert found.freedom == 2
-    assert np.mean(chi2) == pytest.approx(2, rel=0.12)

@@ -17,7 +17,6 @@ from contactfpga.robot.net import session
 from contactfpga.robot.net.message import MOST_ASKED, Message
 from contactfpga.tools import cli
 from contactfpga.wire.command import Command, encode_command
-from contactfpga.wire.protocol import encode_request
 
 psutil = pytest.importorskip("psutil")
 pytest.importorskip("zenoh")
@@ -213,22 +212,6 @@ def test_a_second_publisher_of_a_key_is_refused(endpoint, capsys):
         assert errors.count("\n") == 1
         with contactfpga.open(port(endpoint), timeout=LONG) as board:
             assert board.read(LONG)
-
-
-def test_asking_a_board_that_is_gone_is_no_traceback(endpoint, caplog):
-    """Zenoh would log it; the publisher's own read says what happened."""
-    source, asked = SmallPort(SKIN), []
-
-    def write(data):
-        asked.append(data)
-        raise contactfpga.PortLost("gone")
-
-    source.write = write
-    with session.listening(endpoint) as network, published(source, network, "left"):
-        with session.connected(endpoint) as asks:
-            request = encode_request(0x10101)
-            wait_until(lambda: asks.put("left/ask", request) or len(asked) > 2, LONG)
-    assert caplog.text == ""
 
 
 def test_what_is_far_too_large_goes_no_further(endpoint):

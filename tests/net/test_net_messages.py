@@ -10,7 +10,7 @@ import contactfpga
 from contactfpga.driver.address import parse
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.stats import NetCounters
-from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Message, Stream
+from contactfpga.robot.net.message import BEAT_S, QUIET_S, Message, Stream
 from contactfpga.robot.net.session import LOOPBACK, is_loopback, key_of, own_endpoint
 from contactfpga.wire.command import Command, RequestKind, encode_command, request_kind
 from contactfpga.wire.protocol import encode_request
@@ -150,25 +150,6 @@ def test_after_any_forged_message_a_reader_goes_on_within_a_second(seed):
         assert not late, "what was forged and not believed costs nothing"
 
 
-def test_a_stream_of_forged_messages_that_no_publisher_bears_out_is_refused():
-    """As long as the publisher is heard, whatever others send is none of its own."""
-    rng, counters, now_s = random.Random(1), NetCounters(), 0.0
-    sender, stream, other = Sender(rng), Stream(counters), Sender(rng)
-    found = b"".join(piece for _ in range(2) for piece, _ in stream.take(sender.send(b"!", now_s), now_s))
-    sent, strangers = b"!!", 0
-    for number in range(300):
-        now_s += 0.1
-        if rng.random() < 0.5:
-            assert stream.take(other.send(b"?", now_s), now_s) == []
-            strangers += 1
-        data = b"<%d>" % number
-        sent += data
-        found += b"".join(piece for piece, _ in stream.take(sender.send(data, now_s), now_s))
-    assert found.replace(b"\0", b"") == sent
-    assert counters.refused == strangers
-    assert counters.lost_messages == 0
-
-
 def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
     rng, counters = random.Random(1), NetCounters()
     sender, stream = Sender(rng), Stream(counters)
@@ -183,15 +164,6 @@ def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
     assert (counters.lost_messages, counters.lost_bytes, counters.breaks, counters.messages) == (3, 8, 0, 5)
 
 
-def test_two_messages_in_the_wrong_order_leave_no_hole():
-    sender, counters = Sender(random.Random(1)), NetCounters()
-    stream = Stream(counters)
-    messages = [sender.send(b"%d" % number, 0.0) for number in range(4)]
-    found = [stream.take(messages[number], 0.0) for number in (0, 1, 3, 2)]
-    assert found[2:] == [[], [(b"2", False), (b"3", False)]]
-    assert (counters.lost_messages, counters.refused, counters.messages) == (0, 0, 4)
-
-
 @pytest.mark.parametrize("step_s", [-0.001, -3600.0, 2.1, 3600.0])
 def test_a_step_of_the_publishers_clock_is_a_break(step_s):
     """Or its process stood still, and its port ran over meanwhile: the same from here."""
@@ -202,35 +174,6 @@ def test_a_step_of_the_publishers_clock_is_a_break(step_s):
     assert stream.take(sender.send(b"b", 1000.0 + step_s), 0.0) == [(b"\0b", True)]
     assert stream.take(sender.send(b"c", 1000.1 + step_s), 0.0) == [(b"c", False)]
     assert counters.breaks == 1
-
-
-def test_what_is_no_message_is_refused_and_counted():
-    counters, sender = NetCounters(), Sender(random.Random(1))
-    stream = Stream(counters)
-    whole = sender.send(b"x", 0.0)
-    for bad in (b"", b"cfp1", b"zzzz" + whole[4:], whole + bytes(MOST_BYTES), b"\x80\x04pickled"):
-        assert stream.take(bad, 0.0) == []
-    assert (counters.refused, counters.messages) == (5, 0)
-    stream.take(whole, 0.0)
-    stream.take(whole, 0.0)
-    stream.take(sender.send(b"y", 0.0), 0.0)
-    assert (counters.refused, counters.messages) == (6, 2)
-
-
-def test_a_board_restarts_behind_a_publisher_that_restarts():
-    """The second one is heard as soon as the first has ended, or has been silent for a while."""
-    rng, board, receiver = random.Random(1), ModelBoard(SKIN), Receiver()
-    sender, second = Sender(rng), Sender(rng)
-    board.time_us, board.heard = 5_000_000, 3
-    receiver.take(sender.send(board.hello() + board.frame(), 5.0), 5.0)
-    receiver.take(sender.send(b"", 5.0), 5.0)
-    board.power_up()
-    receiver.take(second.send(board.frame(), 5.4), 5.4)
-    receiver.take(second.send(b"", 5.45), 5.45)
-    assert receiver.counters.publishers == 1
-    receiver.take(second.send(b"", 5.0 + QUIET_S), 5.0 + QUIET_S)
-    assert [zones.time_us for zones in receiver.frames] == [5_000_000]
-    assert (receiver.counters.publishers, receiver.counters.breaks, receiver.counters.refused) == (2, 1, 1)
 
 
 # ---- what may go to a board

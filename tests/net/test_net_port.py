@@ -257,12 +257,6 @@ def test_a_publisher_of_another_release_is_named(network, monkeypatch):
     assert port.read(0.0) == b""
 
 
-def test_an_empty_message_that_comes_twice_is_refused(network, opened):
-    for sequence in (5, 6, 6, 7):
-        network.arrive(Message(1, sequence, 100, 0, 0, b"").encode())
-    assert (opened.counters.messages, opened.counters.lost_messages, opened.counters.refused) == (3, 0, 2)
-
-
 @pytest.fixture
 def read(network, opened):
     """One whose publisher is known."""

@@ -56,30 +56,6 @@ def go_on(board, reader, since_s):
             assert abs(one.at_s - (board.begun_s + one.time_us / 1e6)) < MOST_S + SLOW_S
 
 
-@pytest.mark.campaign  # it compares the clocks of processes that have to get the processor in time
-def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted(endpoint):
-    """Shortly, so that Zenoh does not notice, and for so long that it closes connections."""
-    port = f"zenoh://contactfpga/left-forearm?connect={endpoint}&wait=60"
-    with (
-        Streaming(SKIN, every_s=0.01) as board,
-        router(endpoint, LEASE_S) as one_router,
-        publish(board.path, "--connect", endpoint, lease_s=LEASE_S) as publisher,
-        Reader(port, MOST_S, LEASE_S) as reader,
-    ):
-        board.stream = settle(board, reader)
-        before = unknown(board, reader)
-        for seconds in (0.7, 2.5):
-            for child in (reader, one_router, publisher):
-                stand_still(child, seconds)
-                go_on(board, reader, time.monotonic())
-        settle(board, reader)
-        wait_until(lambda: unknown(board, reader) == before, LONG)
-        last = reader.sights[-1]
-    assert last.restarts == 0
-    assert last.net["publishers"] == 1
-    assert last.net["breaks"] >= 1
-
-
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", range(4))
 def test_random_histories_of_processes(seed):

@@ -33,19 +33,6 @@ def first_message(network):
     return Message.decode(found[0])
 
 
-@pytest.mark.parametrize("far", [1, 1 << 20, 1 << 63])
-def test_one_forged_message_of_any_number_silences_no_reader(far, endpoint):
-    with Streaming(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
-        with contactfpga.open(patient(publisher.line), timeout=LONG) as reader, session.connected(endpoint) as stranger:
-            read, refused = first_message(stranger), reader.stats.net.refused
-            forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
-            stranger.put(f"{KEY}/bytes", forged.encode())
-            wait_until(lambda: reader.stats.net.refused > refused, LONG)
-            assert reader.read(LONG).time_us in board.sent_us
-            frames = reader.stats.frames
-            wait_until(lambda: reader.next(LONG) and reader.stats.frames > frames + 50, LONG)
-
-
 def test_a_forged_token_keeps_no_publisher_from_starting(endpoint):
     """test_net_port.py has that it hides no death."""
     with Streaming(SKIN) as board, router(endpoint), session.connected(endpoint) as stranger:

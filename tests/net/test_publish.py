@@ -69,16 +69,6 @@ def test_a_published_board_is_a_board(streaming, endpoint):
         assert publisher.end() == ""
 
 
-def test_a_virtual_board_is_published_until_the_first_signal(endpoint):
-    with publish("sim://", "--key", "try", "--listen", endpoint) as publisher:
-        with contactfpga.open(patient(publisher.line), timeout=LONG) as board:
-            wait_until(lambda: board.next(LONG).time_us > 300_000, LONG)
-            assert board.read(LONG).time_us > 300_000, "it answers"
-            assert board.stats.lost == 0
-        publisher.process.send_signal(signal.SIGINT)
-        assert publisher.process.wait(LONG) == 0
-
-
 def assert_given_back(pid, path):
     """Else a board that is plugged in again would get another name."""
     held = Path(f"/proc/{pid}/fd")
@@ -142,23 +132,6 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
             assert board.stats.net.publishers == 2
             assert board.stats.lost > 0
             assert board.stats.restarts == 0
-
-
-@pytest.mark.slow
-def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming, endpoint):
-    streaming.waits = True
-    with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):
-        with contactfpga.open(port(endpoint, wait_s=60), timeout=LONG) as board:
-            take(board, 20, streaming.sent_us)
-            first.end()
-            pass_on(streaming)
-            frames = board.stats.frames
-            with router(endpoint):
-                take_until(board, lambda: board.stats.frames > frames + 50, streaming.sent_us)
-                stats = board.stats
-                assert stats.net.publishers == 1
-                assert stats.net.lost_messages > 0 or stats.lost > 0
-                assert stats.restarts == 0
 
 
 def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
@@ -247,12 +220,3 @@ def test_an_endpoint_that_zenoh_cannot_read_is_one_line(opened):
     says = r"^endpoint 'nowhere': Endpoints must be of the form [^{}]*; for instance tcp/127\.0\.0\.1:7447$"
     with pytest.raises(contactfpga.ContactFPGAError, match=says):
         opened("nowhere")
-
-
-def test_a_board_that_is_unplugged_ends_its_publisher(endpoint):
-    with FakeBoard(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
-        board.unplug()
-        said = publisher.process.communicate(timeout=LONG)[1]
-    assert publisher.process.returncode == 1
-    assert "is gone" in said
-    assert said.count("\n") == 1

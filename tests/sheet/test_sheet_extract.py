@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin
-from contactfpga.design.circuit import Circuit, load_circuit, needed
+from contactfpga.design.circuit import Circuit, load_circuit
 from contactfpga.design.sheet import SheetError, extract, files, lay_out
 from contactfpga.design.sheet.drawn import Drawing
 
@@ -97,24 +97,10 @@ def test_a_via_joins_the_sides_of_a_line():
     assert extract._ohms(drawing, "A", 0.0) == pytest.approx(0.49e-3 * 15 / 0.2 + 1e-3, rel=1e-9)  # 1 mohm the via
 
 
-def test_longer_lines_come_to_more():
-    small = extract.extracted(lay_out(Skin(rows=8, columns=8, pitch_x_mm=6.4, pitch_y_mm=6.4))).circuit
-    large = extract.extracted(lay_out(Skin(rows=16, columns=16, pitch_x_mm=6.4, pitch_y_mm=6.4))).circuit
-    assert large.line_ohm > 1.8 * small.line_ohm
-    assert large.neighbor_pf == pytest.approx(2 * small.neighbor_pf, rel=0.02)
-    assert 0.3 < small.crossing_pf < large.crossing_pf < 3
-    assert small.series_ohm == large.series_ohm == 33
-
-
 def test_a_meter_of_cable_is_50_pf():
     layout = lay_out(Skin(rows=4, columns=4))
     near, far = (extract.extracted(layout, cable_m).circuit.line_pf for cable_m in (0.0, 1.0))
     assert far - near == pytest.approx(50, abs=0.5)
-
-
-def test_the_model_takes_what_was_extracted():
-    layout = lay_out(Skin(rows=4, columns=4, pitch_x_mm=6.4, pitch_y_mm=6.4))
-    assert needed(extract.extracted(layout).circuit, 4, 4).settle.seconds < 1e-6
 
 
 def test_the_completed_file_keeps_all_else(tmp_path):

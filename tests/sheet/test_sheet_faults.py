@@ -34,19 +34,6 @@ def changed(path, old, new):
     path.write_text(text.replace(old, new))
 
 
-def test_the_small_sheet_is_sound(folder):
-    board = TracedBoard(folder)
-    assert board.disagreements() == []
-    lines_of(board, SMALL)
-
-
-def test_a_missing_piece_of_a_row_is_seen(folder):
-    # the row's track between cells (1, 1) and (1, 2), on the back at y = -(6.4 + 2.0)
-    piece = "X7300000Y-8400000D02*\nX13700000Y-8400000D01*\n"
-    changed(folder / "sheet-bottom-copper.gbr", piece, "")
-    assert TracedBoard(folder).disagreements() == ["ROW1 is in 2 pieces"]
-
-
 def test_a_missing_via_is_seen(folder):
     # of the diode of cell (2, 3)
     changed(folder / "sheet-plated.drl", "X19.200000Y-12.200000\n", "")

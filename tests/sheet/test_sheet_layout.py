@@ -42,12 +42,6 @@ def test_what_cannot_be_laid_out_is_refused_with_the_limit(changes, part, messag
         lay_out(Skin(**changes), part=part)
 
 
-@pytest.mark.parametrize(("pitch_x", "pitch_y", "part"), [(5.52, 5.2, "dome"), (7.0, 5.8, "tact")])
-def test_the_limit_itself_is_taken(pitch_x, pitch_y, part):
-    layout = lay_out(Skin(rows=3, columns=3, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y), part=part)
-    assert sum(one.reference.startswith("SW") for one in layout.drawing.placed) == 9
-
-
 def placed(layout):
     return list(csv.DictReader(io.StringIO(files.placement_list(layout))))
 
@@ -61,15 +55,6 @@ def test_each_switch_lies_where_the_skin_has_its_cell():
     assert found == {(round(column * 6.4, 4), round(-row * 8.25, 4)) for row, column in cells}
 
 
-@pytest.mark.parametrize("guard", [False, True])
-def test_a_closed_sheet_takes_the_rows_that_its_refusal_names(guard):
-    closed = Skin(rows=20, columns=8, radius_mm=12.0, guard=guard, **CLOSED)
-    most = 14 - guard
-    with pytest.raises(SheetError, match=f"at most {most} rows"):
-        lay_out(closed.replace(rows=most + 1))
-    assert lay_out(closed.replace(rows=most)).skin.rows == most
-
-
 def test_a_closed_sheet_goes_on_over_its_seam():
     skin = Skin(rows=10, columns=16, radius_mm=45.0, guard=True, **CLOSED)
     layout = lay_out(skin)
@@ -79,13 +64,6 @@ def test_a_closed_sheet_goes_on_over_its_seam():
     copper = [x for track in layout.drawing.tracks for x in (track.x1 - track.width / 2, track.x2 + track.width / 2)]
     assert min(copper) >= left + 0.3
     assert max(copper) <= right - 0.3
-
-
-def test_holes_are_in_the_margin():
-    layout = lay_out(Skin(rows=3, columns=3), margin_mm=9.0)
-    left, top, right, bottom = layout.drawing.outline
-    places = {(hole.x, hole.y) for hole in layout.drawing.holes}
-    assert places == set(itertools.product((left + 4.5, right - 4.5), (top + 4.5, bottom - 4.5)))
 
 
 def test_the_guard_lines_are_on_the_outermost_wires():
@@ -160,16 +138,3 @@ def test_caps_are_closed_bodies_with_the_stated_clearances(tmp_path, switch):
 def test_caps_that_touch_or_vanish_are_refused(side, message):
     with pytest.raises(SheetError, match=message):
         caps(Skin(rows=2, columns=2, **TILE), DOME, side)
-
-
-def test_printed_numbers_are_readable():
-    """Each digit is the set of strokes that a seven-segment display lights, told apart from all others."""
-    from contactfpga.design.sheet.drawn import Drawing
-
-    seen = set()
-    for digit in range(10):
-        drawing = Drawing()
-        drawing.number(digit, 0.0, 0.0)
-        seen.add(frozenset((one.x1, one.y1, one.x2, one.y2) for one in drawing.strokes))
-    assert len(seen) == 10
-    assert max(map(len, seen)) == 7

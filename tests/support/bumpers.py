@@ -3,6 +3,9 @@
 import numpy as np
 
 from contactfpga.robot.haptics import LoadCells, Touch, Unit, Wrench, contacts
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.zone import Zones
 
 DEGREE = np.pi / 180
 
@@ -48,6 +51,24 @@ def on_cylinder(degrees, z_m, radius_m=0.038):
     """Point and normal."""
     normal = np.array([np.cos(degrees * DEGREE), np.sin(degrees * DEGREE), 0.0])
     return radius_m * normal + np.array([0, 0, z_m]), normal
+
+
+def shown(skin, cells, number, push_n):
+    """A frame of one zone of these (row, column), whose columns count on over a seam, with a push shared by three
+    units; None: without their readings."""
+    columns = skin.columns
+    bitmap = np.zeros((skin.rows, columns), bool)
+    for row, column in cells:
+        bitmap[row, column % columns] = True
+    past = sum(column >= columns for _, column in cells) if any(column < columns for _, column in cells) else 0
+    sums = [len(cells), sum(column % columns for _, column in cells), sum(row for row, _ in cells)]
+    sums += [past] if skin.closed else []
+    records = np.array([sums] if cells and skin.report == "moments" else [], np.int64).reshape(-1, len(sums))
+    sent = Frame(number, number, frozenset(), 0, 0, 1, len(cells), records, bitmap if skin.report == "cells" else None)
+    zones = Zones(sent, skin.sheet, 1000 * number)
+    if push_n is not None:
+        zones._units = UnitSamples(1000 * number, (push_n / 3,) * 3, (0.0,) * 3, (False,) * 3)
+    return zones
 
 
 def direction(rng):
