@@ -65,7 +65,7 @@ def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
     skin = SKINS[name]
     cycles = 20_000 if name == "slow frames" else 5_000
-    pause = {"slow frames": 9_000, "guarded": 700}.get(name, 1_500)
+    pause = {"slow frames": 9_000, "guarded": 700, "reversal": 4_000}.get(name, 1_500)
     timeline = events(skin, cycles, pause)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 20
