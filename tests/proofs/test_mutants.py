@@ -59,7 +59,7 @@ def test_every_stage_of_the_design_has_mutants(sample):
 @pytest.mark.parametrize(
     ("line", "stage"),
     [
-        (r"-cell $flatten\request$134.$175 -port Y -src /hdl/contactfpga_hdl/link/request.py:124", "serial"),
+        (r"-cell $flatten\request$134.$175 -port Y -src /a folder/contactfpga_hdl/link/request.py:124", "serial"),
         (r"-cell $flatten\label.\walk.$130 -port A -src /site-packages/amaranth/lib/memory.py:9", "label"),
         (r"-cell $auto$ff.cc:337:slice$2260 -port D -src /hdl/contactfpga_hdl/scan/self_test.py:43", "self-test"),
         (r"-cell $auto$opt_expr.cc:277$1863 -port Y -wire audit$7.counts -wirebit 3", "report"),

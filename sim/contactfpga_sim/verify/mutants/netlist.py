@@ -126,7 +126,7 @@ def switches(mutants: Sequence[Mutant]) -> list[str]:
 
 def parsed(line: str) -> Mutant | None:
     """Mutant of a line of Yosys' list; None if excluded."""
-    options = re.findall(r"-(\w+) (\S+)", line)
+    options = re.findall(r"-(\w+) (.+?)(?= -\w+ |\s*$)", line)  # a folder's name may have spaces
     values = dict(options)
     if values["port"] in _LEFT_OUT:
         return None
