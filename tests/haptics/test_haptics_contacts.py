@@ -102,6 +102,7 @@ def test_force_without_a_zone():
     found = contacts(exerted(point, -2 * normal, cells.noise), [], Cylinder(0.038))
     assert found.center.point_m == pytest.approx(point)
     assert (found.model, len(found), found.freedom, found.alarm) == (FULL_WRENCH, 0, 6, True)
+    assert found.unexplained.force_n == pytest.approx(-2 * normal)
     assert not contacts(wrench([0] * 6, cells.noise), [], Cylinder(0.038)).alarm
     rng = np.random.default_rng(1)
     quiet = [contacts(wrench(cells.geometry @ rng.normal(0, 0.05, 6), cells.noise), []).alarm for _ in range(2000)]

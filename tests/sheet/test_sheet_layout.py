@@ -66,6 +66,14 @@ def test_a_closed_sheet_goes_on_over_its_seam():
     assert max(copper) <= right - 0.3
 
 
+def test_the_board_ends_half_a_pitch_and_its_margin_below_the_last_row_with_holes_in_the_margin():
+    drawing = lay_out(Skin(rows=3, columns=4), margin_mm=9.0).drawing
+    left, top, right, bottom = drawing.outline
+    assert bottom == 2 * 10 + 5 + 9
+    corners = itertools.product((left + 4.5, right - 4.5), (top + 4.5, bottom - 4.5))
+    assert {(hole.x, hole.y) for hole in drawing.holes} == set(corners)
+
+
 def test_the_guard_lines_are_on_the_outermost_wires():
     skin = Skin(rows=11, columns=9, guard=True)
     layout = lay_out(skin)

@@ -122,6 +122,11 @@ METERS = "the mesh spans 400 mm, the sheet 4500; a mesh in m needs --scale 1000"
         (laid(9, 4, 10.0, 500.0), "projected", METERS),
         (laid(4, 40, 10.0, 10.0), "unrolled", "row 0: 40 columns are longer than the 282.7 mm around it"),
         (laid(4, 4, 10.0, 10.0, Pose.of((0, 0, 999.0))), "unrolled", "column 0 does not meet the mesh at row 0"),
+        (
+            laid(4, 4, 10.0, 10.0, Pose.of((999.0, 0, 0))),
+            "projected",
+            "16 cells do not meet the mesh, among them row 0",
+        ),
     ],
 )
 def test_sheet_off_the_mesh_is_refused(tube, sheet, by, says):
