@@ -41,13 +41,13 @@ def test_all_intervals_together_cover_the_truth_as_often_as_they_say(scatter, cl
 
 
 def line_s(circuit, pressed):
-    """As the virtual board has it, of a sheet of 8x8."""
+    """Seconds from drive to threshold of a column of an 8x8 sheet, as the virtual board computes them."""
     line = ColumnLine.of(circuit, 8, 8)
     return -line.press_s[pressed] * math.log(1 - line.threshold / line.pulled[pressed])
 
 
 def test_lines_that_do_not_scatter_give_the_values_that_made_them():
-    """But for the clock, here of 0.1 ns."""
+    """The clock of 0.1 ns is the only error."""
     truth = Circuit(line_pf=65, switch_ohm=220, series_ohm=33)
     seconds = {many: line_s(truth, many) for many in (4, 8)}
     made = readings(seconds, np.random.default_rng(0), 0.0, 1e10, (8, 4))

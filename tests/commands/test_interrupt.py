@@ -66,7 +66,7 @@ KEPT = {
     "arm --charts": (3, "interrupted; {} of ", "way,latency_s,"),
     "failures": (1, "of the table, all that was finished, in", "| knob | method |"),  # it has a board to compile
 }
-"""Of studies: after how many rows they are interrupted, what is said, and how the kept table begins."""
+"""For each study: the number of rows before the interrupt, the message, and the start of the kept table."""
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ BUILDS = (
     ),
 )
 def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_path):
-    """SKIN is none of those whose boards the package carries."""
+    """The package carries no board for this Skin, so it has to be built."""
     np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
     (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 8\n")
     words = words.replace("FRAMES", str(tmp_path / "frames.npy")).replace("SKIN", str(tmp_path / "skin.toml"))
@@ -194,7 +194,7 @@ RUNNING = {
     "publish --listen ENDPOINT PORT": "zenoh://",
     "ros --domain 89 PORT": "Ctrl-C ends it",
 }
-"""What each shows once it runs."""
+"""The text that each command shows once it runs."""
 NEEDS = {"ros": "cyclonedds", "publish": "zenoh", "view": "viser", "record": "mcap"}
 
 

@@ -146,7 +146,7 @@ BODIES = {
     except BaseException: return 0""",
     "in a text, usual end": """with interrupt.usual_end(): exec('end(); 1')""",
 }
-"""What a command's code may make of a signal."""
+"""Ways in which the code of a command may treat a signal."""
 
 
 @pytest.mark.parametrize("number", SIGNALS)

@@ -115,7 +115,7 @@ def test_ctrl_c_ends_a_watch_with_what_it_found(simulated):
     ],
 )
 def test_a_watch_says_what_it_cannot_tell(run, skin, says):
-    """Of a board that falls silent once it has said hello."""
+    """The board falls silent after its hello."""
     with FakeBoard(skin) as board:
         status, out = patiently(
             lambda timeout_s: run("doctor", "--watch", "--timeout", timeout_s, board.path)[:2],

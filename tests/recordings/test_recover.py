@@ -57,7 +57,7 @@ def raw_bytes(file):
 
 
 def test_after_kill_9_all_that_was_sent_is_there(tmp_path, capsys):
-    """Of a board that then fell silent: what it said last waits for no other message."""
+    """A board falls silent after a message: that message is recorded at once and waits for no other one."""
     file = tmp_path / "x.mcap"
     with FakeBoard(SKIN) as board:
         process = record(file, board.path)

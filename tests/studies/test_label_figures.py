@@ -1,4 +1,4 @@
-"""What the page states of the labeller's last record: touches at every place."""
+"""The page's figures of the labeller's last record, for touches at every place."""
 
 import itertools
 
