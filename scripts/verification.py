@@ -37,8 +37,8 @@ This page is for a reader who doubts a claim. It lists the tests of each claim, 
 
       python -m pytest tests/gateware/test_scan.py
 
-CI runs `make test-all` and fails when a test of a claim fails, is missing or is skipped. Tests are skipped only where
-the list names a tool that they need and the machine lacks.
+CI runs every test of `make test-all`, of slow ones a third of the cases, and fails when a test of a claim fails, is
+missing or is skipped. Tests are skipped only where the list names a tool that they need and the machine lacks.
 
 ## Claims by subject
 

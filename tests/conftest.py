@@ -10,6 +10,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -118,7 +119,7 @@ STEP = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "only the tests of what reads a sheet, and every third case of each"
     parser.addoption("--quick", action="store_true", help=text)
-    text = "every third case of each test, one at least; whole numbers that follow each other draw all of them"
+    text = "of each slow test every third case, one at least; whole numbers that follow each other draw all of them"
     parser.addoption("--third", type=int, metavar="NUMBER", help=text)
     text = "leave out what passed in this run, whose results --junitxml wrote"
     parser.addoption("--passed", type=Path, metavar="FILE", help=text)
@@ -136,7 +137,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
     quick = config.getoption("quick")
     third = 0 if quick else config.getoption("third")
-    kept = items if third is None else _third(items, third, whole=quick)
+    whole = _kept_whole if quick else _quick
+    kept = items if third is None else _third(items, third, whole)
     if config.getoption("passed"):
         passed = _passed(config.getoption("passed"))
         kept = [item for item in kept if _result(item.nodeid) not in passed]
@@ -146,13 +148,19 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item in left]
 
 
-def _third(items: list[pytest.Item], number: int, whole: bool) -> list[pytest.Item]:
-    """Every third case of each test, and one of a test with fewer than three; with ``whole``, all cases of a test
-    that is marked ``whole``."""
+def _kept_whole(item: pytest.Item) -> bool:
+    return item.get_closest_marker("whole") is not None
+
+
+def _quick(item: pytest.Item) -> bool:
+    return not any(item.get_closest_marker(name) for name in ("slow", "campaign"))
+
+
+def _third(items: list[pytest.Item], number: int, whole: Callable[[pytest.Item], bool]) -> list[pytest.Item]:
+    """Every third case of each test, and one of a test with fewer than three; all cases of a test that is ``whole``."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        kept_whole = whole and item.get_closest_marker("whole")
-        cases.setdefault(item.nodeid if kept_whole else item.nodeid.partition("[")[0], []).append(item)
+        cases.setdefault(item.nodeid if whole(item) else item.nodeid.partition("[")[0], []).append(item)
     return [item for found in cases.values() for item in found[number % min(STEP, len(found)) :: STEP]]
 
 

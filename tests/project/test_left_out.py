@@ -13,16 +13,23 @@ pytestmark = pytest.mark.slow  # it starts pytest six times
 TESTS = """
 import pytest
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["passes", "fails", "a.b::c/d", "\\u03a9", "[x]", "5", "6"])
 def test_seven(case):
     assert case != "fails"
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("case", [1, 2])
 def test_two(case):
     if case == 2:
         pytest.skip("not here")
 
+@pytest.mark.slow
 def test_one():
+    pass
+
+@pytest.mark.parametrize("case", [1, 2, 3, 4])
+def test_quick(case):
     pass
 """
 
@@ -46,11 +53,12 @@ def run(tmp_path_factory):
 
 def test_three_numbers_draw_every_case_and_each_one_of_every_test(run):
     every, thirds = run(), [run(f"--third={number}") for number in (4, 5, 6)]
-    assert len(every) == 10
+    assert len(every) == 14
     assert {name for third in thirds for name in third} == {*every}
-    assert sorted(map(len, thirds)) == [4, 4, 5]
+    assert sorted(map(len, thirds)) == [8, 8, 9]
     for third in thirds:
-        assert {name.partition("[")[0] for name in third} == {"test_seven", "test_two", "test_one"}
+        assert {name.partition("[")[0] for name in third} == {"test_seven", "test_two", "test_one", "test_quick"}
+        assert sum(name.startswith("test_quick") for name in third) == 4, "they are not slow"
 
 
 def test_what_passed_in_a_run_is_left_out_of_the_next_one(run):
@@ -58,4 +66,4 @@ def test_what_passed_in_a_run_is_left_out_of_the_next_one(run):
     again = run("--passed=build/tests.xml")
     assert "test_seven[fails]" in again
     assert "test_two[2]" in again, "it was skipped"
-    assert len(again) == 10 - 2
+    assert len(again) == 14 - 6

@@ -21,7 +21,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def seen():
-    with opening.opened(http_port=0) as shown, browser.visit(shown, 1280, 800) as visitor:
+    with opening.opened(http_port=0) as shown, browser.visit(shown, 800, 500) as visitor:
         browser.tidy(visitor)
         yield shown, visitor
 

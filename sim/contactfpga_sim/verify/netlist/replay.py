@@ -152,8 +152,8 @@ def main() -> int:
     parser.add_argument(
         "--frames", type=numbers.whole(1, 10**9), default=500, help="for each board (default: %(default)s)"
     )
-    told = "every third of the default boards; whole numbers that follow each other draw all"
-    parser.add_argument("--third", type=int, metavar="NUMBER", help=told)
+    told = "one of the default boards; whole numbers that follow each other draw all"
+    parser.add_argument("--one", type=int, metavar="NUMBER", help=told)
     told = "a .npz file with frames named `pressed`, or a folder of such files"
     parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
     args = parser.parse_args()
@@ -161,7 +161,7 @@ def main() -> int:
         parser.error("--skin needs the board that it is for")
     recordings = [Recording.load(path).pressed for path in recordings_in(args.recordings)]
     print(f"frames       {args.frames} per board: shapes, random ones and {len(recordings)} recordings")
-    runs = RUNS if args.third is None else RUNS[args.third % 3 :: 3]
+    runs = RUNS if args.one is None else (RUNS[args.one % len(RUNS)],)
     if args.board:
         runs = ((args.board, Skin.load(args.skin) if args.skin else find(args.board).skin),)
     status = 0
