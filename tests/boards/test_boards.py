@@ -1,5 +1,6 @@
 """Boards: pin tables, what cannot be wired, what is generated from them, and the call of the programmer."""
 
+import dataclasses
 import functools
 import itertools
 from pathlib import Path
@@ -43,6 +44,33 @@ def test_a_board_of_your_own_is_named_by_where_it_is():
     ):
         with pytest.raises(SkinError, match=message):
             find(name)
+
+
+BITSY = "amaranth_boards.icebreaker_bitsy"
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"contact": "pmod_0:1"}, "`row_side` or `column_side` has a pin that cannot be used: .* physical pin 4, .*"),
+        ({"contact": "pmod_9:1"}, "`contact` has a pin that cannot be used: .* nonexistent connector pin pmod_9:1"),
+        ({"row_side": ("pmod_0:1",) * 12}, "`row_side` or `column_side` has a pin that cannot be used: .*"),
+        ({"uart": ("pmod_2:9", "pmod_2:9")}, "`uart` has a pin that cannot be used: .* already used by .*"),
+        ({"held_high": ("pmod_2:10",)}, "`held_high` has a pin that cannot be used: .* already used by .*"),
+        (
+            {"platform": "amaranth_boards.icebreaker_bitsy:ICEBreakerBitsyPlatform"},
+            "`uart` is None and .* has none; name two pins .*",
+        ),
+        (
+            {"platform": "amaranth_boards.icebreaker_bitsy:Nope"},
+            "`platform` is .* has no attribute .Nope.; it is module:class",
+        ),
+    ],
+)
+def test_a_field_that_the_platform_cannot_serve_is_named_in_one_sentence(changes, sentence):
+    board = dataclasses.replace(BOARDS["icebreaker"], **changes)
+    with pytest.raises(SkinError, match=f"^iCEBreaker: {sentence}$"):
+        plan_for(board, board.skin)
 
 
 @every_board

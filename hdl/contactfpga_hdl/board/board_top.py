@@ -3,13 +3,13 @@
 import importlib
 from collections.abc import Mapping
 
-from amaranth.build import Attrs, Pins, Platform, Resource, Subsignal
+from amaranth.build import Attrs, Pins, Platform, Resource, ResourceError, Subsignal
 from amaranth.hdl import Cat, ClockDomain, Const, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
 
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.skin import Skin
+from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several
 from contactfpga_hdl.board.clock import PllClock
 from contactfpga_hdl.scan.pins import column_pins, drives_columns_both_ways, row_pins
@@ -22,8 +22,12 @@ _UART = 1
 
 
 def platform_for(board: BoardSpec) -> Platform:
+    """The board's platform, without resources of a sheet. Raises SkinError for a name that is not there."""
     module, _, name = board.platform.partition(":")
-    return getattr(importlib.import_module(module), name)()
+    try:
+        return getattr(importlib.import_module(module), name)()
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SkinError(f"{board.title}: `platform` is {board.platform!r}: {error}; it is module:class") from None
 
 
 class BoardTop(Elaboratable):
@@ -37,6 +41,23 @@ class BoardTop(Elaboratable):
         self.board = board
         self.skin = skin
         self._sheet = row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
+
+    def check(self) -> None:
+        """Raise SkinError that names the field of the :class:`BoardSpec` whose pins the platform lacks, or has given to
+        another one."""
+        platform = platform_for(self.board)
+        if not self.board.uart and ("uart", 0) not in platform.resources:
+            raise SkinError(
+                f"{self.board.title}: `uart` is None and {self.board.platform} has none; name two pins for a bridge"
+            )
+        sides = dict.fromkeys(self._pins(), "row_side` or `column_side") | {"alive": "column_side"}
+        for resource in self._resources():
+            field = sides.get(resource.name, resource.name)
+            try:
+                platform.add_resources([resource])
+                platform.request(resource.name, resource.number, dir="-")
+            except (ResourceError, NameError) as error:
+                raise SkinError(f"{self.board.title}: `{field}` has a pin that cannot be used: {error}") from None
 
     def elaborate(self, platform):
         m = Module()

@@ -5,11 +5,13 @@ Run ``python -m contactfpga_hdl.board.constraints`` in the project's folder, or 
 
 import itertools
 import re
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec
+from contactfpga.skin import SkinError
 from contactfpga_hdl.board.build import plan_for
 
 PAGE = Path("docs/boards.md")
@@ -60,11 +62,15 @@ def page_with_tables(page: str) -> str:
 
 
 def main() -> None:
+    made = {board.constraints: constraints(board) for board in BOARDS.values()}
     FOLDER.mkdir(exist_ok=True)
-    for name, board in {board.constraints: board for board in BOARDS.values()}.items():
-        (FOLDER / name).write_text(constraints(board), encoding="utf-8")
+    for name, text in made.items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
     PAGE.write_text(page_with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except SkinError as error:
+        sys.exit(f"make constraints: {error}")
