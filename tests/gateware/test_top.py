@@ -107,13 +107,12 @@ def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, de
     assert len(frames) > 3
     counted = 35 + (rows * columns).bit_length() + ((rows + 1) // 2 * ((columns + 1) // 2)).bit_length()
     size = math.ceil((counted + 4) / 8) + 1
-    turns = 1 << 8 * (size - 1) - counted
-    overwritten = 0
     for packet in frames:
         word = int.from_bytes(packet[-size:-1], "little")
-        overwritten += ((word >> counted) - overwritten) % turns  # between two frames fewer than a turn of its counter
-        number = (word >> 24 & 255) + overwritten  # frames before it
+        number = (12 * (word & 0xFFFFFF) + 11) // (clocks * rows)  # of its scan, by its time
         assert word & 0xFFFFFF == (number * clocks * rows + clocks) // 12
+        before = (word >> 24 & 255) + (word >> counted)  # sent, and overwritten modulo the bits of their counter
+        assert (number - before) % (1 << 8 * (size - 1) - counted) == 0
 
 
 WATCHED = (
