@@ -133,6 +133,48 @@ def test_one_that_lifts_out_of_a_shared_zone_is_forgotten():
     assert said[-1].active[0].merged == ()
 
 
+def test_a_finger_that_comes_down_in_the_zone_of_one_that_rests_is_a_contact_of_its_own():
+    """The first lifts, and then the second: each tap has an id."""
+    frames = sequence(lambda n: [(5, 5, 2)], 60) + sequence(lambda n: [(6, 5, 4)], 60, MS, 60 * MS)
+    frames += sequence(lambda n: [(7, 5, 2)], 60, MS, 120 * MS) + [frame(190 * MS, [])]
+    said = run(Tracker(), frames)
+    assert [one for one in events(said) if one[0] != "move"] == [
+        ("down", 1),
+        ("down", 2),
+        ("merge", 1),
+        ("up", 1),
+        ("up", 2),
+    ]
+    assert (ids(said[100]), said[100].active[0].merged, ids(said[120]), ids(said[150])) == ([1], (2,), [2], [2])
+
+
+@pytest.mark.parametrize("opens", [(60, 62), (120, 122)])
+def test_a_switch_that_bounces_in_a_shared_zone_begins_no_other_contact(opens):
+    def places(n):
+        both = 60 <= n < 125 and not (opens[0] < n <= opens[1])
+        return [(6, 5, 4)] if both else [(5, 5, 2)]
+
+    said = run(Tracker(), sequence(places, 300))
+    assert [one for one in events(said) if one[0] != "move"] == [("down", 1), ("down", 2), ("merge", 1), ("up", 2)]
+
+
+def test_a_finger_that_moves_on_in_one_frame_is_no_second_one():
+    said = run(Tracker(), sequence(lambda n: [(5, 5, 2)], 60) + sequence(lambda n: [(5.5, 5, 4)], 9, MS, 60 * MS))
+    assert {one[0] for one in events(said)} == {"down", "move"}
+
+
+def test_a_noisy_cell_that_goes_while_a_zone_breathes_did_not_merge_into_it():
+    """As recorded with `sdh13x6`: a cell beside ten, 26 mm from their middle."""
+    frames = [frame(n * 10 * MS, [(5, 5, 10 + n % 2), *([(5, 2.4, 1)] if n % 3 else [])]) for n in range(1, 40)]
+    assert not {one[0] for one in events(run(Tracker(), frames))} & {"merge", "split"}
+
+
+def test_a_shared_zone_has_the_id_of_the_zone_that_was_largest():
+    """Also where that zone was itself of several small contacts."""
+    small = [frame(0, [(4, 5, 3), (6, 5, 3), (9, 5, 5)]), frame(MS, [(5, 5, 6), (9, 5, 5)])]
+    assert events(run(Tracker(), [*small, frame(2 * MS, [(6.8, 5, 11)])]))[3:] == [("merge", 1), ("merge", 1)]
+
+
 def test_a_finger_that_lifts_from_a_stuck_switch_ends_and_the_switch_stays():
     stuck = [(7, 5, 1)]
     frames = sequence(lambda n: stuck, 10)

@@ -53,6 +53,8 @@ class Member:
     vy: float = 0.0
     known: Known = NEW
     """Covariance on entering."""
+    gone_us: int | None = None
+    """Time at which it left the zone of others; None while it is there."""
 
 
 class Spot:
@@ -66,6 +68,10 @@ class Spot:
         self.joined_us = time_us
         self.small_us: int | None = None
         """Time since which the zone would be large enough without one of its contacts."""
+        self.rest_us = time_us
+        """Time since which the zone keeps its cells."""
+        self.changed_us = -math.inf
+        """Time of the last :meth:`shift`."""
         self.place(zone, time_us)
 
     def place(self, zone: Zone, time_us: int) -> None:
@@ -73,6 +79,7 @@ class Spot:
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
         self.known = Known(error_mm2(zone), 0.0, self.known.speed)
+        self.rest_us = time_us
 
     def ahead(self, time_us: int) -> tuple[float, float]:
         seconds = min((time_us - self.seen_us) / 1e6, COAST_S)
@@ -81,6 +88,8 @@ class Spot:
     def follow(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
         """Continue the spot in a zone, by a Kalman filter of constant velocity."""
         x, y = place(zone)
+        if (x, y, zone.area_mm2) != (self.x, self.y, self.zone.area_mm2):
+            self.rest_us = time_us
         seconds = (time_us - self.seen_us) / 1e6
         if seconds > 0:
             self.fx, self.fy = self.ahead(time_us)
@@ -90,6 +99,26 @@ class Spot:
         self.x, self.y = x, y
         if len(self.members) == 1:
             self.members[0].area_mm2 = zone.area_mm2
+
+    def shift(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
+        """Put the spot at a zone that one contact entered or left, while the others stayed where they were."""
+        x, y = place(zone)
+        for one in self.members:
+            one.dx, one.dy = one.dx - across(x - self.x, around_mm), one.dy - (y - self.y)
+        self.place(zone, time_us)
+        self.joined_us = self.changed_us = time_us
+        self.small_us = None
+        self.members.sort(key=lambda one: one.gone_us is not None)
+
+    def nearest(self, dx: float, dy: float, gone: bool) -> Member | None:
+        """The contact at an offset from the spot's place, within its radius: one that is there, or one that left."""
+        found = [one for one in self.members if (one.gone_us is not None) is gone]
+        best = min(found, key=lambda one: math.hypot(dx - one.dx, dy - one.dy), default=None)
+        return best if best and math.hypot(dx - best.dx, dy - best.dy) <= radius_mm(best.area_mm2) else None
+
+    def remove(self, member: Member) -> None:
+        self.members.remove(member)
+        self.center()
 
     def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
         """Correct by a zone's offset from the expected place; ``error``: variance of the zone's place."""
@@ -133,6 +162,11 @@ class Spot:
         first = self.members[0]
         merged = tuple(one.id for one in self.members[1:]) if len(self.members) > 1 else ()
         return Track(first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.held, merged)
+
+
+def rank(member: Member) -> tuple[float, int]:
+    """Sorting key of contacts in a zone, of which the first gives its id: the largest, then the oldest."""
+    return -member.area_mm2, member.id
 
 
 def place(zone: Zone) -> tuple[float, float]:

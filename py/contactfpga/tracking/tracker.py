@@ -9,7 +9,7 @@ from typing import NamedTuple
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import SAME_S, Member, Spot, error_mm2, place, radius_mm
+from contactfpga.tracking.spot import SAME_S, Member, Spot, error_mm2, place, radius_mm, rank
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
@@ -97,9 +97,9 @@ class Tracker:
         merges: dict[Spot, list[Spot]] = {}
         parts: dict[Spot, list[Zone]] = {}
         if lost:
-            merges = merged(pairs, lost, free, self._apart, self._gate_mm)
+            merges = merged(pairs, lost, free, self._apart, self._shifts, self._gate_mm)
         if free and self._spots:
-            parts = parted(pairs, lost, free, merges, self._apart, self._expects, self._gate_mm)
+            parts = parted(pairs, lost, free, merges, self._apart, self._shifts, self._expects, self._gate_mm)
         hidden = bool(winding) or "overflow" in zones.flags
         self._spots = [spot for spot in lost if self._held(spot, hidden)]
         for spot, zone in pairs:
@@ -146,6 +146,17 @@ class Tracker:
     def _apart(self, spot: Spot, zone: Zone) -> float:
         return self._distance(*spot.ahead(self._time_us), zone)
 
+    def _shifts(self, spot: Spot, zone: Zone, area_mm2: float, x: float, y: float) -> bool:
+        """Whether what came to a spot's zone, or left it, at this place shows: it is not small, or the zone's barycenter
+        went more than half as far as that would shift it."""
+        if abs(area_mm2) >= SMALL * spot.zone.area_mm2:
+            return True
+        ahead_x, ahead_y = spot.ahead(self._time_us)
+        zone_x, zone_y = place(zone)
+        share = area_mm2 / (spot.zone.area_mm2 + area_mm2)
+        dx, dy = share * across(x - ahead_x, self._around_mm), share * (y - ahead_y)
+        return 2 * (dx * across(zone_x - ahead_x, self._around_mm) + dy * (zone_y - ahead_y)) >= dx * dx + dy * dy
+
     def _expects(self, spot: Spot, zone: Zone) -> bool:
         return expected(spot, zone, self._time_us, self._around_mm, self._gate_mm)
 
@@ -160,15 +171,55 @@ class Tracker:
         elif split:
             self._part(spot, [zone, *split])
         else:
-            spot.follow(zone, self._time_us, self._around_mm)
+            if not self._changed(spot, zone):
+                spot.follow(zone, self._time_us, self._around_mm)
             self._spots.append(spot)
             self._forget(spot)
             if self._distance(spot.from_x, spot.from_y, zone) >= self._move_mm:
                 spot.from_x, spot.from_y = spot.x, spot.y
                 self._say("move", spot.members[0].id, zone)
 
+    def _changed(self, spot: Spot, zone: Zone) -> bool:
+        """Whether a contact came into the zone of a spot that rested, or left it, while the others stayed; or came or
+        left again, as switches bounce."""
+        more_mm2 = zone.area_mm2 - spot.zone.area_mm2
+        rested = spot.seen_us - spot.rest_us >= REST_US or self._time_us - spot.changed_us <= self._hold_us
+        if not more_mm2 or not rested:
+            return False
+        x, y = place(zone)
+        scale = zone.area_mm2 / more_mm2
+        dx, dy = scale * across(x - spot.x, self._around_mm), scale * (y - spot.y)
+        if more_mm2 < 0:
+            return self._left(spot, zone, -more_mm2, dx, dy)
+        gone = spot.nearest(dx, dy, gone=True)
+        if gone is not None:
+            gone.gone_us = None
+            spot.shift(zone, self._time_us, self._around_mm)
+            return True
+        least_mm2 = min(one.area_mm2 for one in spot.members) / 2
+        if more_mm2 < least_mm2 or math.hypot(dx, dy) < radius_mm(spot.zone.area_mm2) + radius_mm(more_mm2):
+            return False
+        new = self._begin(zone)
+        new.area_mm2, new.dx, new.dy = more_mm2, dx, dy
+        spot.members.append(new)
+        spot.shift(zone, self._time_us, self._around_mm)
+        first, *others = (one.id for one in spot.members)
+        self._say("merge", first, zone, tuple(others))
+        return True
+
+    def _left(self, spot: Spot, zone: Zone, less_mm2: float, dx: float, dy: float) -> bool:
+        one = spot.nearest(dx, dy, gone=False)
+        there = sum(other.gone_us is None for other in spot.members)
+        if one is None or there == 1 or less_mm2 < one.area_mm2 / 2:
+            return False
+        one.gone_us = self._time_us
+        spot.shift(zone, self._time_us, self._around_mm)
+        return True
+
     def _part(self, spot: Spot, zones: list[Zone]) -> None:
         first = spot.members[0].id
+        for one in spot.members:
+            one.gone_us = None  # it may have parted
         for zone, members in shared_out(spot, zones, self._time_us, self._around_mm, self._gate_mm):
             if not members:
                 members = [self._begin(zone, (first,))]
@@ -184,14 +235,18 @@ class Tracker:
         return False
 
     def _forget(self, spot: Spot) -> None:
-        spare = spot.spare()
+        gone = [(one.gone_us, one) for one in spot.members if one.gone_us is not None]
+        for gone_us, one in gone:
+            if self._time_us - gone_us >= self._hold_us:
+                spot.remove(one)
+                self._say("up", one.id, spot.zone, seen_us=gone_us)
+        spare = None if gone else spot.spare()
         if spare is None:
             spot.small_us = None
         elif spot.small_us is None:
             spot.small_us = self._time_us
         elif self._time_us - spot.small_us >= self._shared_us:
-            spot.members.remove(spare)
-            spot.center()
+            spot.remove(spare)
             spot.small_us = None
             self._say("up", spare.id, spot.zone, seen_us=spot.seen_us)
 
@@ -220,6 +275,10 @@ GOING_S = 1.0
 
 FIRST_S = 0.01
 
+REST_US = 40_000
+"""Time for which a zone has kept its cells when a sudden change of its area tells of a contact that came or left: a
+moving contact takes and leaves cells more often."""
+
 LARGER = 1.0
 """Standard deviation of the logarithm of a contact's growth in a shared zone."""
 
@@ -234,18 +293,24 @@ class Way(NamedTuple):
 
 
 Apart = Callable[[Spot, Zone], float]
+Shifts = Callable[[Spot, Zone, float, float, float], bool]
 
 Pairs = list[tuple[Spot, Zone]]
 
 MOST = 0.75
 """Least ratio of areas of a zone to the spots that merged into it, or of the zones to the spot that parted."""
 
+SMALL = 0.25
+"""Least ratio of areas at which a zone's area alone shows that another one merged into it, or parted."""
+
 REACH = 1.5
 """Gates for parting and merging: a zone leaves or enters another within the gate plus this many radii of the larger
 zone, as feet are long; one of several contacts leaves within this many gates of its expected place."""
 
 
-def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_mm: float) -> dict[Spot, list[Spot]]:
+def merged(
+    pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, shifts: Shifts, gate_mm: float
+) -> dict[Spot, list[Spot]]:
     """Lost spots by the spot whose zone they entered; removed from ``lost``. A new zone of several is removed from
     ``free`` and paired with the largest."""
     found: dict[Spot, list[Spot]] = {}
@@ -254,7 +319,9 @@ def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_
         best, least = None, math.inf
         for other, zone in pairs:
             distance = apart(spot, zone)
-            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2 or distance <= touch_mm(spot.zone, zone)
+            grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2
+            grown = grown and shifts(other, zone, spot.zone.area_mm2, spot.x, spot.y)
+            grown = grown or distance <= touch_mm(spot.zone, zone)
             if grown and distance < least and distance <= gate_mm + REACH * radius_mm(zone.area_mm2):
                 best, least = other, distance
         if best is not None:
@@ -279,18 +346,21 @@ def parted(
     free: list[Zone],
     merges: dict[Spot, list[Spot]],
     apart: Apart,
+    shifts: Shifts,
     expects: Callable[[Spot, Zone], bool],
     gate_mm: float,
 ) -> dict[Spot, list[Zone]]:
     """New zones by the spot that they leave, by place and lost area or by expected places of contacts; removed from
     ``free``, and lost spots in several zones from ``lost``."""
     found: dict[Spot, list[Zone]] = {}
-    left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
+    own = {spot: zone for spot, zone in pairs if spot not in merges}
+    left = {spot: zone.area_mm2 for spot, zone in own.items()}
     for zone in list(free):
         best, least = None, math.inf
         for spot in left:
             count = 1 + len(found.get(spot, ()))
             lost_area = spot.zone.area_mm2 >= left[spot] + zone.area_mm2 / 2
+            lost_area = lost_area and shifts(spot, own[spot], -zone.area_mm2, *place(zone))
             reach = min(least, gate_mm + REACH * radius_mm(spot.zone.area_mm2))
             more = lost_area or (count < len(spot.members) and expects(spot, zone))
             if more and (distance := apart(spot, zone)) <= reach:
@@ -322,18 +392,15 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
             member.dx, member.dy = across(ahead_x + member.dx - x, around_mm), ahead_y + member.dy - y
             member.vx, member.vy = member.vx + one.vx, member.vy + one.vy
             member.known = one.known
-    spot.members += [member for other in others for member in other.members]
-    spot.members.sort(key=_rank)
+    largest = min((spot, *others), key=lambda one: (-one.zone.area_mm2, one.members[0].id))
+    rest = [member for one in (spot, *others) if one is not largest for member in one.members]
+    spot.members = largest.members + sorted(rest, key=rank)
     total = spot.area_mm2
     spot.vx = math.fsum(member.area_mm2 * member.vx for member in spot.members) / total
     spot.vy = math.fsum(member.area_mm2 * member.vy for member in spot.members) / total
     spot.place(zone, time_us)
     spot.joined_us, spot.small_us = time_us, None
     spot.center()
-
-
-def _rank(member: Member) -> tuple[float, int]:
-    return -member.area_mm2, member.id
 
 
 def _ways(spot: Spot, member: Member, zone: Zone, time_us: int, around_mm: float | None) -> tuple[Way, Way]:
@@ -384,7 +451,7 @@ def shared_out(
     for member, line, column in zip(spot.members, odd, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
-        members.sort(key=_rank)
+        members.sort(key=rank)
     # The one that it went by comes first, so that what parts from it is told after it.
     first = spot.members[0]
     return sorted(zip(zones, found), key=lambda pair: first not in pair[1])
