@@ -614,8 +614,10 @@ static inline bool contactfpga__explain(
             reader->forgot = true; /* only a restart forgets a request */
             return false;
         }
-        if (contactfpga__gap(reader, sequence) && time_us < CONTACTFPGA__BEGUN_US && heard != reader->before_heard)
-            return false;
+        /* A board that has heard no request begins again at 0 in a restart, and when its time wraps. */
+        bool begins = heard != reader->before_heard
+            || (!heard && time_us < (reader->time_us & (CONTACTFPGA__WRAP_US - 1)));
+        if (contactfpga__gap(reader, sequence) && time_us < CONTACTFPGA__BEGUN_US && begins) return false;
     }
     if (!reader->timed) { /* from one epoch before the hello's to three after it */
         int64_t first_us = ((int64_t)reader->epoch - 1) * (int64_t)CONTACTFPGA__EPOCH_US;

@@ -42,7 +42,7 @@ class BoardTop(Elaboratable):
         self.skin = skin
         self._sheet = row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
 
-    def check(self) -> None:
+    def _check(self) -> None:
         """Raise SkinError that names the field of the :class:`BoardSpec` whose pins the platform lacks, or has given to
         another one."""
         platform = platform_for(self.board)
@@ -60,6 +60,7 @@ class BoardTop(Elaboratable):
                 raise SkinError(f"{self.board.title}: `{field}` has a pin that cannot be used: {error}") from None
 
     def elaborate(self, platform):
+        self._check()
         m = Module()
         m.submodules.core = core = self._core()
         if self.skin.clock_hz != self.board.clock_hz:

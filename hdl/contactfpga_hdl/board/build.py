@@ -64,11 +64,11 @@ def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -
 def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan:
     """Amaranth's build plan: netlist, constraints and script. Raises SkinError if the board has no pins for it."""
     board.check(skin)
+    platform = platform_for(board)
     top = SheetsTop(board, skin) if isinstance(skin, Several) else BoardTop(board, skin)
-    top.check()
     options = synthesis.overrides(board.fpga)
     options["nextpnr_opts"] += f" {_NEXTPNR} --seed {seed}"
-    return platform_for(board).build(top, NAME, do_build=False, debug_verilog=False, **options)
+    return platform.build(top, NAME, do_build=False, debug_verilog=False, **options)
 
 
 def _described(skin: Skin | Several) -> dict[str, str]:

@@ -106,11 +106,13 @@ class Timeline:
             return None
         return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
 
-    def expects(self, heard: int, time_us: int, now: float) -> bool:
-        """Whether a frame with this request number and time continues the last explained frame."""
+    def expects(self, heard: int, time_us: int, sequence: int, now: float) -> bool:
+        """Whether a frame with this request number, time and number continues the last explained frame."""
         if self.before is None or self._time_us is None or not self._known:
             return False
         soon = not self._live or now - self._now <= self._patience_s
+        if not heard and time_us < self.before.time_us and (sequence - self._next) % _SEQUENCES:
+            return False
         return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
 
     @property
@@ -153,7 +155,9 @@ class Timeline:
             if before.heard and not frame.heard:
                 self._forgot = True
                 return None
-            if self._gap(frame) and frame.time_us < BEGUN_US and frame.heard != before.heard:
+            # A board that has heard no request begins again at 0 in a restart, and when its time wraps.
+            begins = frame.heard != before.heard or (not frame.heard and frame.time_us < before.time_us)
+            if self._gap(frame) and frame.time_us < BEGUN_US and begins:
                 return None  # a frame was lost, or this is one of the first since a restart
         if self._time_us is None:  # from one epoch before the hello's to three after it
             first_us = (self._epoch - 1) * _EPOCH_US
@@ -168,10 +172,11 @@ def continues(packets: np.ndarray) -> np.ndarray:
 
     ``packets``: consecutive ones, of :data:`contactfpga.wire.many.FIELDS`.
     """
-    valid, heard, time_us = packets["valid"], packets["heard"], packets["time_us"]
+    valid, heard, time_us, sequence = (packets[name] for name in ("valid", "heard", "time_us", "sequence"))
     found = np.zeros(len(packets), np.bool_)
     step_us = time_us[1:] - time_us[:-1] & _WRAP_US - 1
     found[1:] = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
+    found[1:] &= (heard[1:] > 0) | (time_us[1:] > time_us[:-1]) | (sequence[1:] - sequence[:-1] & _SEQUENCES - 1 == 1)
     return found
 
 

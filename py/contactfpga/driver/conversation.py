@@ -221,8 +221,8 @@ class Conversation:
         if not self._requests.idle or self.lines.fading or not self._clock.begun:
             return at
         assert reads.decoded is not None
-        valid, time_us, _, heard, *_ = reads.decoded.packets[first].item()
-        return end if valid and self._timeline.expects(heard, time_us, reads.at_s[at]) else at
+        valid, time_us, sequence, heard, *_ = reads.decoded.packets[first].item()
+        return end if valid and self._timeline.expects(heard, time_us, sequence, reads.at_s[at]) else at
 
     def _take_reads(self, reads: Reads, at: int, end: int) -> Run:
         assert self._widths is not None
@@ -293,8 +293,8 @@ class Conversation:
         first is expected.
         """
         found = continues(packets)
-        _, time_us, _, heard, *_ = packets[0].item()
-        expected = bool(packets["valid"][0]) and self._timeline.expects(heard, time_us, now)
+        valid, time_us, sequence, heard, *_ = packets[0].item()
+        expected = valid and self._timeline.expects(heard, time_us, sequence, now)
         found[0] = expected
         return _ends(found), expected
 

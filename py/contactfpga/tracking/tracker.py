@@ -147,8 +147,8 @@ class Tracker:
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _shifts(self, spot: Spot, zone: Zone, area_mm2: float, x: float, y: float) -> bool:
-        """Whether what came to a spot's zone, or left it, at this place shows: it is not small, or the zone's barycenter
-        went more than half as far as that would shift it."""
+        """Whether what came to a spot's zone, or left it, at this place shows: it is not small, or the barycenter went
+        more than half as far as that would shift it."""
         if abs(area_mm2) >= SMALL * spot.zone.area_mm2:
             return True
         ahead_x, ahead_y = spot.ahead(self._time_us)
