@@ -467,18 +467,6 @@ _ALL = (
         },
     ),
     Study(
-        "tested",
-        title="Changes of the gateware's source that the default tests notice",
-        page="mutants.md",
-        minutes=60,
-        sections={
-            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| all", heads="^(?!folder)"),
-            "left": Section("scripts/tested_mutants.py:left"),
-        },
-        compute="scripts/tested_mutants.py:compute",
-        extra="test",
-    ),
-    Study(
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",
