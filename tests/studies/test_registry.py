@@ -48,8 +48,7 @@ SHOWN = [
     ),
 ]
 DRAWN = [
-    *("maker", "net", "scenes", "tracking"),
-    pytest.param("diagrams", marks=pytest.mark.slow),
+    *("net", "scenes", "tracking"),
     pytest.param("arm", marks=(pytest.mark.campaign, pytest.mark.timeout(7200))),
 ]
 

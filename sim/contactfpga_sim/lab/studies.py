@@ -161,13 +161,6 @@ _ALL = (
         extra="test",
     ),
     Study(
-        "diagrams",
-        title="Diagrams of the whole, of the skin, a touch, the wiring and a packet",
-        page="index.md",
-        minutes=0.5,
-        pictures="pictures:draw",
-    ),
-    Study(
         "failures",
         title="One knob after another until something breaks",
         page="failures.md",
@@ -282,7 +275,7 @@ _ALL = (
     ),
     Study(
         "maker",
-        title="The maker's sheet: diodes, pull-ups, series resistors and the schematic",
+        title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
         minutes=1,
         sections={
@@ -290,7 +283,6 @@ _ALL = (
             "pulls": Section("tables:pulls_table", kept=r"^\| (10|22|47) k", sample="tables:pulls_table"),
             "series": Section("tables:series_table", kept=r"^\| (none|33|100)", sample="tables:series_table"),
         },
-        pictures="tables:draw",
     ),
     Study(
         "mujoco",
@@ -519,13 +511,6 @@ _ALL = (
         pictures="tables:draw",
         extra="test",
         needs=("chromium",),
-    ),
-    Study(
-        "wave",
-        title="One touch as a waveform",
-        page="wave.md",
-        minutes=1,
-        pictures="picture:draw",
     ),
 )
 STUDIES = {study.name: study for study in _ALL}
