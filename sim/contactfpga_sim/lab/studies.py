@@ -235,19 +235,6 @@ _ALL = (
         extra="test",
     ),
     Study(
-        "inexact",
-        title="Faults of labellers of others, in models of them",
-        page="rivals.md",
-        minutes=2,
-        sections={
-            "inexact": Section("scripts/measure_inexact.py:inexact_table"),
-            "inexact_frames": Section(
-                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
-            ),
-        },
-        compute="scripts/measure_inexact.py:compute",
-    ),
-    Study(
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
@@ -363,20 +350,6 @@ _ALL = (
             "loss": Section("tables:loss_table", kept="worst"),
         },
         extra="test",
-    ),
-    Study(
-        "rivals",
-        title="Labellers of others on our bench",
-        page="rivals.md",
-        minutes=60,
-        sections={
-            "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="labeller|builds"),
-        },
-        compute="scripts/measure_rivals.py:compute",
-        extra="boards",
-        needs=("git", "ghdl"),
     ),
     Study(
         "ros",
