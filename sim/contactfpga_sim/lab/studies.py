@@ -178,7 +178,7 @@ _ALL = (
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
-        pictures="tables:draw_for_page",
+        pictures="tables:draw",
     ),
     Study(
         "fit",
