@@ -31,7 +31,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -135,10 +134,9 @@ def converted(clone: Path, sheet: Sheet, scrambled: bool) -> str:
     is written."""
     if shutil.which("ghdl") is None:
         raise RivalError("ghdl, which converts LinkRunCCA's VHDL, was not found; sudo apt install ghdl")
-    area, sum_x, sum_y = sheet.moment_bits
     label = (sheet.width - 1).bit_length() - 1  # address bits of its tables, by the rule of its own packages
     numbers = {"width": sheet.width, "height": sheet.width, "x_bits": sheet.place_bits, "y_bits": sheet.place_bits}
-    numbers |= {"label_bits": label, "area_bits": area, "sum_x_bits": sum_x, "sum_y_bits": sum_y}
+    numbers |= {"label_bits": label, **dict(zip(("area_bits", "sum_x_bits", "sum_y_bits"), sheet.moment_bits))}
     constants = "".join(f"constant {name}: integer := {number};\n" for name, number in numbers.items())
     theirs = [clone / name for name in SOURCES]
     tables = [OWN / "scrambled_tables.vhdl"] if scrambled else theirs[: len(TABLES)]
@@ -278,8 +276,7 @@ def sizes(netlists: Netlists, options: argparse.Namespace, collides: bool) -> li
         for device in options.devices:
             say(f"{device.title}, {setting}: place and route {options.seeds} times")
             found = size.measure_netlists(netlists, device, options.seeds, before(device, setting, collides))
-            clock = f"{found.fmax_mhz:.0f} MHz"
-            cells.append(f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {clock}")
+            cells.append(f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz")
     return cells
 
 
@@ -331,7 +328,7 @@ def tables(options: argparse.Namespace) -> str:
 
 
 def say(line: str) -> None:
-    print(f"{time.strftime('%H:%M:%S')} {line}", file=sys.stderr, flush=True)
+    print(line, file=sys.stderr, flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
