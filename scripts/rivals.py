@@ -295,10 +295,10 @@ class Row(NamedTuple):
 
 def rows(lines: int, options: argparse.Namespace) -> Iterator[Row]:
     """The rival, then ours. Raises :class:`RivalError` if one of ours is wrong."""
-    clone = None if options.verilog else fetched(options.clone)
-    sheet, frames = Sheet(lines, *options.blank), frames_for(lines, FRAMES[lines])
-    say(f"{lines}x{lines}: {len(frames):,} frames")
+    sheet, clone = Sheet(lines, *options.blank), None if options.verilog else fetched(options.clone)
     verilog = converted(clone, sheet, False) if clone else options.verilog.read_text(encoding="utf-8")
+    frames = frames_for(lines, FRAMES[lines])
+    say(f"{lines}x{lines}: {len(frames):,} frames")
     checked, collided = check_rival(verilog, sheet, frames), "not tried"
     if clone and not checked.wrong:
         collided = f"{check_rival(converted(clone, sheet, True), sheet, frames).wrong:,}"
