@@ -102,9 +102,6 @@ soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does an
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]
 	$(PY) -m contactfpga_sim.lab.mutants $(ARGS)
 
-mutants-tested: $(VENV)/.stamp-test | compiler ## change the gateware's source: does what `make test` runs notice? (an hour) [ARGS="--count 20"]
-	$(PY) scripts/tested_mutants.py $(ARGS)
-
 SEED ?= 0
 audit: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## draw claims, tables and mutants by a seed of yours and check them, in five minutes: SEED=7
 	$(PY) scripts/audit.py --seed $(call quoted,SEED) $(ARGS)

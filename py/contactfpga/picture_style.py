@@ -48,15 +48,9 @@ DARK = {
     BLACK: "#ffffff",
     GRAY: "#9aa3ad",
     BROWN: "#bf8a5c",
-    "#e8c4a8": "#8d6950",
     "#cfe3d4": "#2d4535",
-    "#d3e6f3": "#1c3c53",
-    "#f8dfcf": "#55301c",
-    "#d0ece3": "#17463a",
-    "#fbecc8": "#4d3d14",
-    "#f4e1ec": "#4b2e42",
 }
-"""Colors on a dark page, by their light ones; the last are tints. Orange and purple are visible on both."""
+"""Colors on a dark page, by their light ones; the last is a tint. Orange and purple are visible on both."""
 
 WIDTH_PX = 720
 

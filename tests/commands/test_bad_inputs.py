@@ -159,7 +159,6 @@ CASES = [
     ["record", "x.mcap", "sim://", "--seconds", "0"],
     *(["fit", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     *(["fit", name] for name in ("elbow", "", "/dev/zero", *CELLS)),
-    ["study", "failures", "--study", "elbow"],
     *(["study", "arm", "--case", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     ["study", "arm", "--case", "elbow"],
     [],

@@ -55,7 +55,7 @@ def test_every_command_explains_itself(name, run):
     ("typed", "said"),
     [
         ("zone", "argument COMMAND: 'zone' is none; did you mean 'zones'?"),
-        ("study flip", "argument TOPIC: 'flip' is none; did you mean 'flips'?"),
+        ("study char", "argument TOPIC: 'char' is none; did you mean 'chart'?"),
         ("xyz", "argument COMMAND: 'xyz' is none; known are zones, view, body, wire"),
     ],
 )
@@ -144,12 +144,15 @@ def test_every_command_has_a_file_of_its_own():
     assert files == set(cli.COMMANDS)
 
 
-@pytest.mark.parametrize(("old", "new"), cli.RENAMED.items())
-def test_an_old_name_works_and_names_the_new_one(old, new, run):
-    status, out, errors = run(old, "--help")
-    assert status == 0
-    assert f"usage: contactfpga {new.removesuffix(' --recover')} " in out
-    assert errors == f"contactfpga: contactfpga {old} is now contactfpga {new}\n"
+@pytest.mark.parametrize(("old", "now"), cli.NOW.items())
+def test_an_old_name_answers_in_one_line_with_what_to_use(old, now, run):
+    for rest in ((), ("--help",), ("--kept", "--design", "run")):
+        assert run(*old.split(), *rest) == (2, "", f"contactfpga: contactfpga {old} is now {now}\n")
+    if now.startswith("contactfpga "):
+        assert run(*now.split()[1:], "--help")[0] == 0
+    else:
+        page, name = re.fullmatch(r"docs/(\w+\.md), which make pages NAME=(\w+) makes anew", now).groups()
+        assert STUDIES[name].page == page
 
 
 def test_topics_of_study_are_studies():

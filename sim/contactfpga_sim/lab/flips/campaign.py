@@ -107,16 +107,6 @@ def _key(design: str, memory: bool, block: int) -> str:
     return repr((kept.made_by(__name__, skin(design)), memory, block))
 
 
-def finished(names: Iterable[str]) -> list[Row]:
-    """Cached flips of these designs, before each one's first missing block."""
-    return [
-        Row(name, FlipOutcome(*one))
-        for memory in (False, True)
-        for name in names
-        for one in _first(kept.found("flips", _key(name, memory, block)) for block in itertools.count())
-    ]
-
-
 @functools.lru_cache(maxsize=len(DESIGNS))
 def _reference(design: str) -> Reference:
     return Reference(skin(design))

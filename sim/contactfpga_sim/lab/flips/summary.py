@@ -32,12 +32,6 @@ class Share(NamedTuple):
     def interval(self) -> tuple[float, float]:
         return wilson(self.hits, self.of)
 
-    def __str__(self) -> str:
-        if not self.of:
-            return ""
-        low, high = self.interval
-        return f"{100 * self.hits / self.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
-
 
 def measured(names: Iterable[str]) -> list[Design]:
     """Bits and LUT4 of designs; needs programs of extra ``boards``."""

@@ -1,1 +1,1 @@
-"""The maker's sheet: diodes, resistors and schematic."""
+"""The maker's sheet: diodes and resistors."""

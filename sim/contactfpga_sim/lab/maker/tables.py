@@ -1,14 +1,12 @@
-"""Tables and schematic of docs/maker.md."""
+"""Tables of docs/maker.md."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, needed, static
 from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.maker import schematic
 
 SIZE = 16
 PULLED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5600.0)
@@ -68,7 +66,3 @@ def _us(time: Time) -> str:
 
 def _kilo(ohm: float) -> str:
     return f"{ohm / 1000:g} kΩ"
-
-
-def draw(folder: Path) -> Path:
-    return schematic.draw(folder / "schematic.svg")

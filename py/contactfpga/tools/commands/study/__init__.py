@@ -6,8 +6,6 @@ from collections.abc import Callable
 
 TOPICS = {
     "chart": "Chart what speed costs in accuracy.",
-    "failures": "Turn one knob after another until something breaks.",
-    "flips": "Flip bits of the running gateware one by one and see what the host notices.",
     "arm": "Run the robot arm into a human arm and see what force results.",
 }
 USUAL = None

@@ -1,4 +1,4 @@
--- LinkRunCCA behind the pixel port that scripts/rivals/README.md describes.
+-- LinkRunCCA behind the pixel port that scripts/rivals.py describes.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

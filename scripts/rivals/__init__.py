@@ -1,1 +1,0 @@
-"""Other people's labellers, measured like ours. ``rival.py`` describes the port that they are put into."""

@@ -1,1 +1,0 @@
-"""Explanatory diagrams."""

@@ -1,1 +1,0 @@
-"""One touch as a waveform, for a page."""
