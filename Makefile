@@ -94,7 +94,7 @@ formal: $(VENV)/.stamp-test ## prove what docs/formal.md says: make formal [ARGS
 	$(PY) -m contactfpga_sim.verify.proofs $(ARGS)
 
 campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
-	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
+	$(PY) -m pytest -n $(JOBS) --dist worksteal -m campaign --timeout 7200 $(ARGS)
 
 soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
 	$(PY) -m contactfpga_sim.lab.speed.soak $(ARGS)

@@ -93,9 +93,9 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     shown, visitor = seen
     shown.hand.click(30, 50)
     shown.hand.click(30, 110)
-    visitor.page.wait_for_selector("text=2 contacts", timeout=120_000)
+    visitor.page.wait_for_selector("text=2 contacts")
     _, _, shown_wide, shown_high = visitor.page.evaluate("window.box()")
-    with visitor.page.expect_download(timeout=120_000) as kept:
+    with visitor.page.expect_download() as kept:
         visitor.page.keyboard.press("p")
     kept.value.save_as(tmp_path / "kept.png")
     assert kept.value.suggested_filename == "contactfpga.png"
@@ -104,7 +104,7 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     assert high == pytest.approx(scale * (shown_high + 4 * 1.6 * 14), abs=2)
     assert 0.25 < scale < 1.01
     visitor.page.keyboard.press("l")
-    visitor.page.wait_for_selector("text=Nothing touches", timeout=120_000)
+    visitor.page.wait_for_selector("text=Nothing touches")
     assert shown.hand.fingers == []
 
 
@@ -122,9 +122,10 @@ def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
 def test_a_page_is_dark_for_who_likes_it(seen, scheme):
     shown, visitor = seen
     page = visitor.page.context.browser.new_page(viewport={"width": 400, "height": 300}, color_scheme=scheme)
+    page.set_default_timeout(1e3 * browser.PATIENCE_S)
     try:
-        page.goto(shown.url, timeout=120_000)
-        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached", timeout=120_000)
+        page.goto(shown.url)
+        page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached")
         red, green, blue = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/[0-9]+/g).map(Number)")
         assert (red + green + blue < 150) == (scheme == "dark")
     finally:

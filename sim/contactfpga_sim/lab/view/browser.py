@@ -18,7 +18,7 @@ from contactfpga.tools.view.tiles import MM
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # Without a graphics card all is drawn by the processor.
 SOFTWARE = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 
 WATCH = """
 () => {
@@ -67,7 +67,7 @@ def program() -> str | None:
 class Visitor:
     def __init__(self, page: Any, shown: ServedView):
         self.page, self._shown = page, shown
-        page.goto(shown.url, timeout=1e3 * PATIENCE_S)
+        page.goto(shown.url)
         until = time.monotonic() + PATIENCE_S
         while not shown.web.get_clients():
             if time.monotonic() > until:
@@ -104,7 +104,7 @@ class Visitor:
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
         self.page.mouse.move(*self._pixel(shares[0]))
-        self.page.wait_for_function(OVER, timeout=1e3 * PATIENCE_S)
+        self.page.wait_for_function(OVER)
         self.page.mouse.down()
         for one in shares[1:]:
             self.page.mouse.move(*self._pixel(one), steps=8)
@@ -154,6 +154,7 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = 
         try:
             scheme: Any = "dark" if dark else "light"
             page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+            page.set_default_timeout(1e3 * PATIENCE_S)
             yield Visitor(page, shown)
         finally:
             browser.close()
