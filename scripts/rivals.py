@@ -340,7 +340,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ContactFPGAError, BitstreamFailed, OSError) as error:
         print(f"rivals: {error}", file=sys.stderr)
         return 1
-    print(f"tools: {', '.join(f'{tool} {importlib.metadata.version(tool)}' for tool in TOOLS)}", file=sys.stderr)
+    installed = {one.metadata["Name"]: one.version for one in importlib.metadata.distributions()}
+    print(f"tools: {', '.join(f'{tool} {installed.get(tool)}' for tool in TOOLS)}", file=sys.stderr)
     return 0
 
 

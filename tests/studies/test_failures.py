@@ -15,7 +15,6 @@ from scipy.stats import fisher_exact
 from study_pages import outdated, section
 
 from contactfpga.skin import Skin
-from contactfpga.tools import cli
 from contactfpga_sim.lab.failures import electric, knob_pictures, line, rated, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
@@ -408,14 +407,3 @@ def test_lines_of_the_table(verdicts, expected):
     knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
     (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
     assert line.split(" | ")[1:-1] == ["method", *expected]
-
-
-@pytest.mark.slow
-def test_the_command_writes_a_study(tmp_path, capsys):
-    assert cli.main(["study", "failures", "--study", "ghost", "--output", str(tmp_path)]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["failures.md", "ghost.svg"]
-    assert (tmp_path / "ghost.svg").read_text() == (PAGE.parent / "images" / "failures" / "ghost.svg").read_text()
-    lines = (tmp_path / "failures.md").read_text().splitlines()[2:]
-    assert lines
-    shown = [line for name in ("failures", "unnoticed") for line in section("failures.md", name).splitlines()]
-    assert all(line in shown for line in lines if line)
