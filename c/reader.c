@@ -236,8 +236,10 @@ static void judge(port *p, uint64_t first, const read_ *came) {
     for (uint64_t i = first; p->clean && i < came->packets; i++) {
         const fields *frame = &p->packets[i % PACKETS].frame;
         int64_t step = (frame->time_us - p->time_us) & ((int64_t)CONTACTFPGA__WRAP_US - 1);
-        p->clean = frame->valid && frame->heard == p->base.heard && step > 0 && step <= (int64_t)CONTACTFPGA__EPOCH_US
-            && (frame->heard || frame->time_us >= (p->time_us & ((int64_t)CONTACTFPGA__WRAP_US - 1)));
+        /* A board that has heard no request begins again at 0 in a restart, and when its time wraps. */
+        bool begins = !frame->heard && frame->time_us < (p->time_us & ((int64_t)CONTACTFPGA__WRAP_US - 1));
+        p->clean = frame->valid && frame->heard == p->base.heard && !begins && step > 0
+            && step <= (int64_t)CONTACTFPGA__EPOCH_US;
         p->time_us += step;
     }
     if (!p->clean) return;

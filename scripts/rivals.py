@@ -58,7 +58,7 @@ TABLES = ("table_ram_add", "table_ram_data")
 UNITS = (*TABLES, "equivalence_resolver", "feature_accumulator", "holes_filler", "row_buf", "table_reader", "window")
 SOURCES = [f"src/vhdl/vhdl_{unit}.vhdl" for unit in (*UNITS, "linkruncca")]
 SHA256 = "b47c950d775e0666288c747e14fcdcf9554c53d4f1012f4154d8fb136a86ef1f"
-"""Of its sources, one after the other."""
+"""Hash of the files in `SOURCES`, joined in their order."""
 OWN = Path(__file__).parent / "linkruncca"
 """Wrapper, accumulator and memory models for LinkRunCCA, and the bench."""
 CLONE = Path("build/rivals/linkruncca")
@@ -218,7 +218,7 @@ def check_rival(verilog: str, sheet: Sheet, frames: np.ndarray) -> Checked:
 
 
 def check_ours(labeller: str, lines: int, frames: np.ndarray) -> Checked:
-    """The same frames through one of ours, a row per clock as long as it takes them."""
+    """What one of our labellers makes of frames; it gets a row in every clock in which it takes one."""
     with LabelBench(size.square(lines).replace(labeller=labeller, settle_us=20.0)) as bench:
         got = bench.run(frames)
     late = int(got.last_record_clocks.max())
@@ -341,7 +341,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"rivals: {error}", file=sys.stderr)
         return 1
     installed = {one.metadata["Name"]: one.version for one in importlib.metadata.distributions()}
-    print(f"tools: {', '.join(f'{tool} {installed.get(tool)}' for tool in TOOLS)}", file=sys.stderr)
+    print("tools:", ", ".join(f"{tool} {installed[tool]}" for tool in TOOLS if tool in installed), file=sys.stderr)
     return 0
 
 

@@ -119,7 +119,7 @@ STEP = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "only the tests of what reads a sheet, and every third case of each"
     parser.addoption("--quick", action="store_true", help=text)
-    text = "of each slow test every third case, one at least; whole numbers that follow each other draw all of them"
+    text = "every third case of each slow or campaign test, one at least; three numbers in a row draw all of them"
     parser.addoption("--third", type=int, metavar="NUMBER", help=text)
     text = "leave out what passed in this run, whose results --junitxml wrote"
     parser.addoption("--passed", type=Path, metavar="FILE", help=text)
@@ -137,7 +137,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
     quick = config.getoption("quick")
     third = 0 if quick else config.getoption("third")
-    whole = _kept_whole if quick else _quick
+    whole = _kept_whole if quick else _fast
     kept = items if third is None else _third(items, third, whole)
     if config.getoption("passed"):
         passed = _passed(config.getoption("passed"))
@@ -152,12 +152,12 @@ def _kept_whole(item: pytest.Item) -> bool:
     return item.get_closest_marker("whole") is not None
 
 
-def _quick(item: pytest.Item) -> bool:
+def _fast(item: pytest.Item) -> bool:
     return not any(item.get_closest_marker(name) for name in ("slow", "campaign"))
 
 
 def _third(items: list[pytest.Item], number: int, whole: Callable[[pytest.Item], bool]) -> list[pytest.Item]:
-    """Every third case of each test, and one of a test with fewer than three; all cases of a test that is ``whole``."""
+    """Every third case of each test, and one of a test with fewer than three; all cases where ``whole`` is true."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         cases.setdefault(item.nodeid if whole(item) else item.nodeid.partition("[")[0], []).append(item)

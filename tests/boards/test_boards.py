@@ -58,13 +58,10 @@ BITSY = "amaranth_boards.icebreaker_bitsy"
         ({"uart": ("pmod_2:9", "pmod_2:9")}, "`uart` has a pin that cannot be used: .* already used by .*"),
         ({"held_high": ("pmod_2:10",)}, "`held_high` has a pin that cannot be used: .* already used by .*"),
         (
-            {"platform": "amaranth_boards.icebreaker_bitsy:ICEBreakerBitsyPlatform"},
-            "`uart` is None and .* has none; name two pins .*",
+            {"platform": f"{BITSY}:ICEBreakerBitsyPlatform"},
+            "`uart` is None and .* has none; name two pins for .*",
         ),
-        (
-            {"platform": "amaranth_boards.icebreaker_bitsy:Nope"},
-            "`platform` is .* has no attribute .Nope.; it is module:class",
-        ),
+        ({"platform": f"{BITSY}:Nope"}, "`platform` is .* has no attribute 'Nope'; it is module:class"),
     ],
 )
 def test_a_field_that_the_platform_cannot_serve_is_named_in_one_sentence(changes, sentence):

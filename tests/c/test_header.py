@@ -365,6 +365,20 @@ def test_a_sheet_that_is_another_by_one_field_is_a_change(decoder, skin, changed
     assert " skin_changes=1 restarts=0 " in said[-1]
 
 
+@pytest.mark.parametrize(("lost", "known"), [(0, 3), (1, 1)])
+def test_a_board_that_heard_no_request_and_lost_frames_is_not_known_when_its_time_begins_at_0(decoder, lost, known):
+    """A lost frame at the wrap of the time looks like a restart."""
+    board = ModelBoard(Skin())
+    board.sent, board.time_us = 100, 2**24 - 100
+    data = board.hello() + board.frame()
+    board.sent += lost
+    board.time_us += 96
+    data += board.frame() + board.frame()
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert sum(line.startswith("frame ") for line in said) == known
+
+
 def test_a_loss_of_more_than_32_bits_is_counted(decoder):
     wire = ModelBoard(Skin()).wire
     data = wire.hello(sent=1) + wire.hello(sent=2**40)

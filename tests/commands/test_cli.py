@@ -151,7 +151,7 @@ def test_an_old_name_answers_in_one_line_with_what_to_use(old, now, run):
     if now.startswith("contactfpga "):
         assert run(*now.split()[1:], "--help")[0] == 0
     else:
-        page, name = re.fullmatch(r"docs/(\w+\.md), which make pages NAME=(\w+) makes anew", now).groups()
+        page, name = re.fullmatch(r"docs/(\w+\.md); `make pages NAME=(\w+)` makes its tables", now).groups()
         assert STUDIES[name].page == page
 
 

@@ -291,6 +291,23 @@ def enlist(link, ask):
     return look
 
 
+def test_neither_shows_a_frame_after_a_restart_as_the_one_after_a_wrap(pairs):
+    """The board heard no request, and the hello after its restart is lost."""
+    pair, board = pairs(), ModelBoard(contactfpga.Skin())
+    newest = Newest(pair)
+    board.sent, board.time_us = 100, 2**24 - 30 * 96
+    pair.take(board.hello() + board.frame())
+    newest.step()
+    pair.take(b"".join(board.frame() for _ in range(20)))
+    newest.step()
+    assert newest.shown == 1
+    board.power_up()
+    pair.take(b"".join(board.frame() for _ in range(20)))
+    newest.step()
+    assert newest.seen == 2
+    assert facts(pair.thread) == facts(pair.native)
+
+
 def test_what_the_ring_overwrites_counts_as_lost(pairs):
     """As if the line had lost it; the newest frame is always there."""
     pair, board = pairs(), ModelBoard(SKINS["moments"])

@@ -40,7 +40,7 @@ def with_numbers(name):
 
 
 def test_the_whole():
-    """Of a time the median is shown, and in parentheses the worst."""
+    """Each time is a median, with the worst in parentheses."""
     rows = re.findall(r"^\| starter \| closed switch to the [^|]*\|(.*)\|$", section("kits.md", "times"), re.MULTILINE)
     times = [[round(float(cell)) for cell in row.split("|")] for row in rows]
     row_us = 1e6 * (TIMES.settle_clocks + TIMES.release_clocks) / SKIN.clock_hz

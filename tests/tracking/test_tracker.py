@@ -134,7 +134,7 @@ def test_one_that_lifts_out_of_a_shared_zone_is_forgotten():
 
 
 def test_a_finger_that_comes_down_in_the_zone_of_one_that_rests_is_a_contact_of_its_own():
-    """The first lifts, and then the second: each tap has an id."""
+    """The first finger lifts before the second one does, and each tap has an id of its own."""
     frames = sequence(lambda n: [(5, 5, 2)], 60) + sequence(lambda n: [(6, 5, 4)], 60, MS, 60 * MS)
     frames += sequence(lambda n: [(7, 5, 2)], 60, MS, 120 * MS) + [frame(190 * MS, [])]
     said = run(Tracker(), frames)
@@ -164,13 +164,13 @@ def test_a_finger_that_moves_on_in_one_frame_is_no_second_one():
 
 
 def test_a_noisy_cell_that_goes_while_a_zone_breathes_did_not_merge_into_it():
-    """As recorded with `sdh13x6`: a cell beside ten, 26 mm from their middle."""
+    """The recording `sdh13x6` has such a cell, 26 mm from the middle of ten."""
     frames = [frame(n * 10 * MS, [(5, 5, 10 + n % 2), *([(5, 2.4, 1)] if n % 3 else [])]) for n in range(1, 40)]
     assert not {one[0] for one in events(run(Tracker(), frames))} & {"merge", "split"}
 
 
 def test_a_shared_zone_has_the_id_of_the_zone_that_was_largest():
-    """Also where that zone was itself of several small contacts."""
+    """The largest zone is of several small contacts, each smaller than the other zone."""
     small = [frame(0, [(4, 5, 3), (6, 5, 3), (9, 5, 5)]), frame(MS, [(5, 5, 6), (9, 5, 5)])]
     assert events(run(Tracker(), [*small, frame(2 * MS, [(6.8, 5, 11)])]))[3:] == [("merge", 1), ("merge", 1)]
 

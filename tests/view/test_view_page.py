@@ -21,6 +21,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def seen():
+    # The window is small because the processor draws it.
     with opening.opened(http_port=0) as shown, browser.visit(shown, 800, 500) as visitor:
         browser.tidy(visitor)
         yield shown, visitor

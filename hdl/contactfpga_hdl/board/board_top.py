@@ -43,8 +43,8 @@ class BoardTop(Elaboratable):
         self._sheet = row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
 
     def _check(self) -> None:
-        """Raise SkinError that names the field of the :class:`BoardSpec` whose pins the platform lacks, or has given to
-        another one."""
+        """Raise SkinError that names the field of the :class:`BoardSpec` with a pin that the platform lacks or that is
+        used twice."""
         platform = platform_for(self.board)
         if not self.board.uart and ("uart", 0) not in platform.resources:
             raise SkinError(

@@ -60,8 +60,8 @@ NOW = {
     "arm": "contactfpga study arm",
     "surface": "contactfpga body surface",
     "recover": "contactfpga record --recover",
-    **dict.fromkeys(("failures", "study failures"), "docs/failures.md, which make pages NAME=failures makes anew"),
-    **dict.fromkeys(("flips", "study flips"), "docs/flips.md, which make pages NAME=flips makes anew"),
+    **dict.fromkeys(("failures", "study failures"), "docs/failures.md; `make pages NAME=failures` makes its tables"),
+    **dict.fromkeys(("flips", "study flips"), "docs/flips.md; `make pages NAME=flips` makes its tables"),
 }
 """Old names of commands and topics: what has their answer now."""
 

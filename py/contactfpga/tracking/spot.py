@@ -69,7 +69,7 @@ class Spot:
         self.small_us: int | None = None
         """Time since which the zone would be large enough without one of its contacts."""
         self.rest_us = time_us
-        """Time since which the zone keeps its cells."""
+        """Time of the last change of the zone's place or area."""
         self.changed_us = -math.inf
         """Time of the last :meth:`shift`."""
         self.place(zone, time_us)
@@ -111,7 +111,8 @@ class Spot:
         self.members.sort(key=lambda one: one.gone_us is not None)
 
     def nearest(self, dx: float, dy: float, gone: bool) -> Member | None:
-        """The contact at an offset from the spot's place, within its radius: one that is there, or one that left."""
+        """The contact within its radius of an offset from the spot's place; None without one. ``gone``: of those that
+        left, else of those that are there."""
         found = [one for one in self.members if (one.gone_us is not None) is gone]
         best = min(found, key=lambda one: math.hypot(dx - one.dx, dy - one.dy), default=None)
         return best if best and math.hypot(dx - best.dx, dy - best.dy) <= radius_mm(best.area_mm2) else None

@@ -147,8 +147,8 @@ class Tracker:
         return self._distance(*spot.ahead(self._time_us), zone)
 
     def _shifts(self, spot: Spot, zone: Zone, area_mm2: float, x: float, y: float) -> bool:
-        """Whether what came to a spot's zone, or left it, at this place shows: it is not small, or the barycenter went
-        more than half as far as that would shift it."""
+        """Whether a change of a spot's zone explains an area that came to it (positive) or left it at a place. A small
+        area must have moved the barycenter at least half as far as it would alone."""
         if abs(area_mm2) >= SMALL * spot.zone.area_mm2:
             return True
         ahead_x, ahead_y = spot.ahead(self._time_us)
@@ -180,8 +180,8 @@ class Tracker:
                 self._say("move", spot.members[0].id, zone)
 
     def _changed(self, spot: Spot, zone: Zone) -> bool:
-        """Whether a contact came into the zone of a spot that rested, or left it, while the others stayed; or came or
-        left again, as switches bounce."""
+        """Take a contact that entered or left the zone of a spot at rest while the others stayed, and return whether
+        one did. A switch that bounces after such a change may do so at once."""
         more_mm2 = zone.area_mm2 - spot.zone.area_mm2
         rested = spot.seen_us - spot.rest_us >= REST_US or self._time_us - spot.changed_us <= self._hold_us
         if not more_mm2 or not rested:
@@ -189,8 +189,10 @@ class Tracker:
         x, y = place(zone)
         scale = zone.area_mm2 / more_mm2
         dx, dy = scale * across(x - spot.x, self._around_mm), scale * (y - spot.y)
-        if more_mm2 < 0:
-            return self._left(spot, zone, -more_mm2, dx, dy)
+        return (self._entered if more_mm2 > 0 else self._left)(spot, zone, abs(more_mm2), dx, dy)
+
+    def _entered(self, spot: Spot, zone: Zone, more_mm2: float, dx: float, dy: float) -> bool:
+        """Take a contact that entered a zone at an offset from the spot's place; return whether the new area is one."""
         gone = spot.nearest(dx, dy, gone=True)
         if gone is not None:
             gone.gone_us = None
@@ -208,6 +210,7 @@ class Tracker:
         return True
 
     def _left(self, spot: Spot, zone: Zone, less_mm2: float, dx: float, dy: float) -> bool:
+        """Note that a contact left a zone at an offset from the spot's place; return whether the lost area was one."""
         one = spot.nearest(dx, dy, gone=False)
         there = sum(other.gone_us is None for other in spot.members)
         if one is None or there == 1 or less_mm2 < one.area_mm2 / 2:
@@ -276,8 +279,8 @@ GOING_S = 1.0
 FIRST_S = 0.01
 
 REST_US = 40_000
-"""Time for which a zone has kept its cells when a sudden change of its area tells of a contact that came or left: a
-moving contact takes and leaves cells more often."""
+"""Time at rest after which a sudden change of a zone's area counts as a contact that entered or left. A contact that
+moves changes its cells more often."""
 
 LARGER = 1.0
 """Standard deviation of the logarithm of a contact's growth in a shared zone."""
