@@ -88,7 +88,6 @@ FIRST = (
     "test_label_volume",
     "test_label",
     "test_cosim",
-    "test_adaptive",
     "test_planted",
     "test_barycenter",
     "test_replay",

@@ -51,16 +51,13 @@ def item_layout(derived: Derived) -> data.StructLayout:
 def tag_layout(derived: Derived) -> data.StructLayout:
     """The scanner's data of a frame besides its cells.
 
-    ``slots``: row times, if they vary and the link counts them. ``heard``: number of the last request before the
-    frame's first sample. ``requested``: whether that request came since the previous frame's. ``fault``: columns are
-    stuck, or other faults are reported. ``motion``, if the scan reads rows, complete with the last row: a row read
-    touched as the frame began, and empty when driven.
+    ``heard``: number of the last request before the frame's first sample. ``requested``: whether that request came
+    since the previous frame's. ``fault``: columns are stuck, or other faults are reported. ``motion``, if the scan
+    reads rows, complete with the last row: a row read touched as the frame began, and empty when driven.
     """
-    uneven = not derived.scan.even and not derived.scan.waits
-    slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
     motion = {"motion": 1} if derived.skin.reads_rows else {}
     known = {"time": TIME_BITS, "stuck": STUCK_BITS, "fault": 1, "heard": HEARD_BITS, "requested": 1}
-    return data.StructLayout(known | slots | motion)
+    return data.StructLayout(known | motion)
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:

@@ -191,12 +191,12 @@ class Top(wiring.Component):
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
         if not self.derived.debounced:
             return scan.rows
-        even = self.derived.scan.even
+        waits = self.derived.scan.waits
         chosen = debounces.find(self.skin.debounce)
-        make = chosen.load_gateware() if even else chosen.load_timed_gateware()
+        make = chosen.load_timed_gateware() if waits else chosen.load_gateware()
         debounce = self._put(m, "debounce", make(self.skin))
         wiring.connect(m, scan.rows, debounce.raw)
-        if not even:
+        if waits:
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 

@@ -144,10 +144,6 @@ def test_a_board_that_is_unplugged_is_told(capsys):
         ({"report": "moments"}, "sends zones, not cells"),
         ({"debounce": "sym_defer_pk"}, "debounces ('sym_defer_pk'), which hides what one frame shows"),
         (
-            {"scan": "adaptive", "precharge_us": 0.0},
-            'takes no sample at; build its Skin with report = "cells" and scan = ',
-        ),
-        (
             {"column_read": "74hc165", "precharge_us": 0.0, "settle_us": 0.5, "release_us": 9},
             "cannot be sampled before 10; build",
         ),

@@ -26,7 +26,6 @@ def random_skin(rng):
             "connectivity": rng.choice([4, 8]),
             "labeller": rng.choice(list(labellers.LABELLERS)),
             "report": rng.choice(["moments", "moments", "barycenter", "cells"]),
-            "scan": rng.choice(["raster", "adaptive"]),
             "send": rng.choice(["always", "on_change"]),
             "diodes": rng.choice(["col2row", "row2col"]),
             "row_drive": rng.choice(["direct", "74hc595"]),

@@ -20,7 +20,7 @@ from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.zones import closed_flood
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
 from contactfpga_sim.verify.cosim.compare import compare
-from contactfpga_sim.verify.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
+from contactfpga_sim.verify.cosim.covering import CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25.0, "closed": True}
 SKINS = {
@@ -30,10 +30,7 @@ SKINS = {
 }
 
 
-COVERING = {
-    scan: pairwise(closed(choices))
-    for scan, choices in (("raster", CHOICES), ("adaptive", ADAPTIVE), ("reversal", REVERSAL))
-}
+COVERING = {scan: pairwise(closed(choices)) for scan, choices in (("raster", CHOICES), ("reversal", REVERSAL))}
 EVERY = [(scan, number) for scan, chosen in COVERING.items() for number in range(len(chosen))]
 
 

@@ -15,7 +15,6 @@ from contactfpga_sim.verify.cosim import bench_cocotb
 SMALL = Skin(rows=4, columns=5, clock_hz=3_000_000, baud=750_000, settle_us=9.0)
 SKINS = {
     "raster": SMALL,
-    "adaptive": SMALL.replace(scan="adaptive"),
     "reversal": SMALL.replace(scan="reversal", precharge_us=0.5),
     "shift registers": SMALL.replace(rows=9, columns=10, row_drive="74hc595", column_read="74hc165", settle_us=20.0),
     "cells, serial": SMALL.replace(report="cells", diodes="row2col"),

@@ -29,7 +29,6 @@ SKINS = {
     "on change": SMALL.replace(send="on_change", keep_alive_ms=0.4),
     "barycenters": SMALL.replace(report="barycenter", labeller="serial", settle_us=14.0),
     "cells": SMALL.replace(report="cells", diodes="row2col"),
-    "adaptive": SMALL.replace(scan="adaptive"),
     "reversal": SMALL.replace(scan="reversal", precharge_us=0.5, send="on_change", keep_alive_ms=3.5),
 }
 FRAMES = 24

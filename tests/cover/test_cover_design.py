@@ -142,10 +142,12 @@ def test_latency_of_the_sheet():
     assert 241.0e-6 < divided < latency_s(Skin())
 
 
-def test_latency_counts_an_adaptive_scan_at_its_longest_and_a_labeller_that_takes_its_time():
+def test_latency_counts_a_reversal_scan_at_its_longest_and_a_labeller_that_takes_its_time():
     long = Skin(settle_us=50.0)
-    slots = [latency_s(long.replace(scan=scan)) / 51e-6 for scan in ("raster", "adaptive")]
-    assert slots[1] - slots[0] == pytest.approx(2 * (2 * 4 + 2))
+    reversal = long.replace(scan="reversal", precharge_us=1.0)
+    for name, times in (("project_us", 2), ("settle_us", 2 * 16)):
+        longer = reversal.replace(**{name: getattr(reversal, name) + 1})
+        assert latency_s(longer) - latency_s(reversal) == pytest.approx(times * 1e-6)
     serial = latency_s(long.replace(labeller="serial")) - latency_s(long)
     assert serial == pytest.approx((16 + 8 + 2) / 12e6)
 

@@ -110,9 +110,7 @@ def test_a_row_comes_out_as_many_clocks_later_as_it_has_columns_and_three(bench,
     assert max(gaps) <= max(10, columns + 6), "each row is done before the Skin lets the next one come"
 
 
-UNEVEN = {"rows": 3, "columns": 4, "clock_hz": 12_000_000, "report": "cells"}
-SLOTS = Skin(**UNEVEN, scan="adaptive", settle_us=4.0)
-MICROSECONDS = Skin(**UNEVEN, scan="reversal", precharge_us=1.0, settle_us=2.0)
+UNEVEN = Skin(rows=3, columns=4, clock_hz=12_000_000, report="cells", scan="reversal", precharge_us=1.0, settle_us=2.0)
 
 
 def timed(method, press, release, samples):
@@ -146,15 +144,12 @@ def rows_alone(skin, taken):
         for now, row, levels in taken:
             ctx.set(dut.raw.payload.cells, packed(levels))
             ctx.set(dut.raw.payload.last, row == 2)
-            if skin.derived.skips:
-                ctx.set(dut.raw.payload.y, row)
             ctx.set(dut.now, now % 2 ** len(dut.now))
             ctx.set(dut.raw.valid, 1)
             while not (await ctx.tick().sample(dut.raw.ready))[-1]:
                 pass
             ctx.set(dut.raw.valid, 0)
-            if skin.derived.scan.waits:  # its clock goes on while the row is inside
-                ctx.set(dut.now, ~now % 2 ** len(dut.now))
+            ctx.set(dut.now, ~now % 2 ** len(dut.now))  # its clock goes on while the row is inside
             for _ in range(skin.columns + 4):
                 _, _, valid, left = await ctx.tick().sample(dut.rows.valid, dut.rows.payload)
                 if valid:
@@ -175,16 +170,10 @@ def packed(levels):
 @pytest.mark.whole
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
-@pytest.mark.parametrize("skin", [SLOTS, MICROSECONDS], ids=["adaptive", "reversal"])
-def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, skin, method, press, release):
+def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, method, press, release):
     """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
-    if skin is SLOTS:
-        unit_us = 3 * round(skin.derived.row_clocks / 12)  # a scan
-        times = [max(0, (scans - 1) * 3 + 1) for scans in (press, release)]
-    else:
-        unit_us = 1
-        times = [us + 1 if us else 0 for us in (press, release)]
-    skin = skin.replace(debounce=method, debounce_press_us=press * unit_us, debounce_release_us=release * unit_us)
+    times = [us + 1 if us else 0 for us in (press, release)]
+    skin = UNEVEN.replace(debounce=method, debounce_press_us=press, debounce_release_us=release)
     now, levels, taken = 0, [[0] * 4 for _ in range(3)], []
     for row in list(range(3)) * 120:
         now += rng.randint(1, 2)

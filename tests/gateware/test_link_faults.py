@@ -47,7 +47,7 @@ def predicted(skin, frames, changes, asked, cycles):
         told.change(cycle, word)
     link = Link(facts(skin), State(facts(skin), [], Reception([], [])), told)
     decided = [taken for taken, _ in decisions(skin, frames, None)]
-    period = facts(skin).hello_slots // facts(skin).row_lines
+    period = facts(skin).hello_scans
     for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[period - 1 :: period])]):
         link.want_hello(cycle)
     overwritten = 0

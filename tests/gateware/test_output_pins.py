@@ -14,9 +14,9 @@ from contactfpga import Skin, examples
 from contactfpga.skin.several import Several
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
-from contactfpga_sim.verify.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, pairwise, skin_for
+from contactfpga_sim.verify.cosim.covering import CHOICES, REVERSAL, pairwise, skin_for
 
-COVERING = [*pairwise(CHOICES), *pairwise(ADAPTIVE), *pairwise(REVERSAL)]
+COVERING = [*pairwise(CHOICES), *pairwise(REVERSAL)]
 SOME = each_choice(COVERING)
 UNITS = {"rows": 2, "columns": 3, "clock_hz": 12_000_000, "baud": 3_000_000, "units": 2, "converter_v": 3.3}
 FAST = {

@@ -19,10 +19,9 @@ FIELDS = {
 }  # fmt: skip
 SYM, EAGER = ({"debounce": method} for method in ("sym_defer_pk", "asym_eager_defer_pk"))
 BOARDS = {
-    "raster": Skin(**FIELDS, **SYM, units=2, unit_sums=((1, 1),)),
+    "raster": Skin(**FIELDS, **SYM, units=2, unit_sums=((1, 1),), labeller="projection"),
     "raster, guard": Skin(**FIELDS | {"rows": 4}, **EAGER, guard=True, fail_safe=True, labeller="serial"),
     "raster, cells": Skin(**FIELDS, **EAGER, report="cells", send="on_change", keep_alive_ms=5),
-    "adaptive": Skin(**FIELDS | {"release_us": 16}, **SYM, scan="adaptive", labeller="projection"),
     "reversal": small(**EAGER, columns=9, debounce_press_us=9, debounce_release_us=30, self_test=True),
     "reversal, guard": small(**SYM, columns=9, debounce_press_us=3, debounce_release_us=30, guard=True, alive=True),
     "around": Skin(**FIELDS | {"columns": 8, "settle_us": 30}, closed=True, surface="cylinder", radius_mm=20.0,
@@ -116,8 +115,8 @@ def levels(rng, width: int, cycles: int, pressed: float, rests: int) -> list[int
 
 
 CASES = [
-    ("raster", "reset"), ("raster, guard", "flip"), ("adaptive", "reset"),
-    ("reversal", "flip"), ("raster, cells", "reset"), ("reversal, guard", "reset"),
+    ("raster", "reset"), ("raster, guard", "flip"), ("reversal", "flip"),
+    ("raster, cells", "reset"), ("reversal, guard", "reset"),
     ("raster", "dual"), ("reversal", "dual"), ("around", "reset"),
 ]  # fmt: skip
 

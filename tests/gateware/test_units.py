@@ -39,7 +39,6 @@ SKINS = {
         self_test=True,
         alive=True,
     ),
-    "adaptive": Skin(**SMALL | {"settle_us": 30}, units=4, scan="adaptive", unit_sums=[[1, 1, 1, 1]] * 2),
 }
 ALONE = {
     "one unit": Skin(**SMALL, units=1, unit_sums=[[1], [-1], [2]]),

@@ -16,8 +16,6 @@ LONG = {
     "records are the zones, 3 columns, 4 rows, 8-connected",
     "serial: records are the zones, 3 columns, 4 rows, 8-connected",
     "serial: nothing overflows, 3 columns, 4 rows, 8-connected",
-    "frames of an adaptive scan, 16 rows",
-    "frames of an adaptive scan, 8 rows",
     "nothing overflows, nothing is left, 4 columns, 4-connected",
     "serial: nothing overflows, 2 columns, 4 rows, 4-connected",
     "rows find the zones, 3x3, 4-connected",

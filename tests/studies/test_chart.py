@@ -39,7 +39,7 @@ from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.families import placements, touches
-from contactfpga_sim.model.scenes.scene import Scene, edge, fingertip, palm, two_fingers
+from contactfpga_sim.model.scenes.scene import Scene
 from contactfpga_sim.verify.cosim.compare import Mismatch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,19 +123,6 @@ def test_a_board_that_takes_longer_is_noticed(monkeypatch):
     cells = np.ones((8, 8), bool)
     with pytest.raises(Mismatch):
         speed.touch(SMALL, cells, 0.5, check=True)
-
-
-@pytest.mark.slow
-def test_a_frame_of_an_adaptive_scan_takes_at_most_25_clocks_more_than_the_bound(record_property):
-    skin, over = METHODS["adaptive, 10 mm, tiles"].skin, []
-    for scene in (fingertip, two_fingers, palm, edge):
-        cells = scene(skin).pressed(0.0, skin)
-        _, size = speed.touch(skin, cells, 0.3)
-        bound = (int(cells.any(axis=1).sum()) + 1) * skin.derived.row_clocks + size * 10 * skin.derived.bit_clocks
-        over.append(speed.frame_clocks(skin, cells, size) - bound)
-    assert min(over) > 0
-    assert max(over) <= 25
-    record_property("worst", f"{max(over)} clocks")
 
 
 def test_a_steady_frame_takes_its_scan_and_its_bytes():

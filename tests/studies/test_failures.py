@@ -58,7 +58,6 @@ NOT_NOTICED = {
     ("diodes", "the same with guard lines"): (1, 2),
     ("diodes_reversal", "the same with guard lines"): (1, 2),
     ("moving", "`raster`"): (1, 1),
-    ("moving", "`adaptive`"): (4, 5),
     ("moving", "starter kit, 10 N"): (2, 3),
     ("clock", "board with `clock_hz` off"): (0.3, 1),
 }

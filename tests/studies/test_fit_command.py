@@ -88,7 +88,8 @@ def test_the_command_fails_where_other_scenes_break_a_limit(tmp_path, shortcuts,
         (["none.toml"], "No such file"),
         (["bumper", "--placements", "50"], "the limit of miscounted is 5 %; take 73 scenes or more"),
         (["bumper", "--labeller", "x"], "labeller is 'x'; it must be one of 'run', 'serial', 'projection', 'single'"),
-        (["bumper", "--scan", "x"], "--scan 'x' is not known; take one of: raster; adaptive; reversal"),
+        (["bumper", "--scan", "x"], "scan is 'x'; it must be one of 'raster', 'reversal', or 'module:"),
+        (["bumper", "--scan", "adaptive"], "scan is 'adaptive', which no longer exists; use 'reversal'"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(arguments, message, capsys):

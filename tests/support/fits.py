@@ -23,7 +23,7 @@ LUTS = {"cells": 300, "single": 500, "serial": 520, "projection": 560, "run": 80
 def made_up(skin):
     """LUT4 in the order that synthesis finds, without its minutes."""
     by = "cells" if skin.report == "cells" else skin.labeller
-    more = 150 * (skin.scan == "adaptive") + 20 * (skin.connectivity == 4 and by in ("serial", "run"))
+    more = 20 * (skin.connectivity == 4 and by in ("serial", "run"))
     return LUTS[by] + more + 5 * (skin.rows + skin.columns)
 
 
@@ -41,7 +41,7 @@ class Shortcuts:
     def measure(self, skin, frames, checked):
         self.checked.append((skin, checked))
         size = 12 + skin.rows * math.ceil(skin.columns / 8) if skin.report == "cells" else 17
-        scan = 6.0 * skin.rows * (0.5 if skin.scan == "adaptive" else 1)
+        scan = 6.0 * skin.rows
         return Speed(1.5 * scan + 10 * size / 3, 2 * scan + 10 * size / 3, scan, size, scan, 1e6 / scan)
 
 

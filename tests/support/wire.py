@@ -166,7 +166,7 @@ class Wire:
     @property
     def commands(self) -> bytes:
         """Numbers of the commands that its board takes: a self-test, "sample at", and those of units without sums."""
-        moves = self.skin.report == "cells" and self.skin.scan != "adaptive"
+        moves = self.skin.report == "cells"
         return b"\x01" * self.skin.self_test + b"\x02" * moves + b"\x03\x04" * bool(self.skin.units)
 
     def hello_fields(self, *, sent=0, epoch=0, heard=0, stuck=0, facts=None) -> list:

@@ -34,7 +34,7 @@ fast = small.replace(scan="reversal", precharge_us=0.5)
 chains = {"row_drive": "74hc595", "column_read": "74hc165", "settle_us": 20.0, "fail_safe": True}
 round = {"surface": "cylinder", "radius_mm": 20.0, "closed": True}
 skins = [
-    small.replace(scan="adaptive", labeller="serial", debounce="sym_defer_pk", dual=True),
+    fast.replace(debounce="sym_defer_pk", dual=True),
     small.replace(labeller="projection", guard=True, alive=True, units=3, converter="mcp3208"),
     small.replace(labeller="single", debounce="asym_eager_defer_pk", units=2, converter="ads131m08"),
     fast.replace(guard=True, self_test=True, labeller="serial", **round),

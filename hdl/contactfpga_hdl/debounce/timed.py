@@ -1,4 +1,4 @@
-"""Debounce for rows sampled at uneven times: delays are counted in row times."""
+"""Debounce for a scan that waits: rows are sampled at uneven times, and delays are counted in us."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
@@ -10,14 +10,14 @@ from contactfpga_hdl.payloads import row_layout
 
 
 class TimedDebounce(wiring.Component):
-    """Raw rows in, debounced rows out; a row that was driven alone takes C + 3 clocks, other rows none.
+    """Raw rows in, debounced rows out; a row that was driven takes C + 3 clocks, other rows none.
 
     Other rows are quiet: no cell reads pressed, and no switch counts as pressed or has a time running. After reset all
     rows are quiet.
 
     raw (in): a frame's rows in ascending order.
-    alone (in): the offered row was driven alone.
-    now (in): row time of its sample, constant for C + 4 clocks unless the scan waits.
+    alone (in): the offered row was driven.
+    now (in): time of its sample.
     rows (out): debounced rows.
     busy (out): a bit per row that was not quiet after its last sample, from the row's offer on.
     """
@@ -43,11 +43,9 @@ class TimedDebounce(wiring.Component):
         row = Signal(range(self.skin.rows))  # of which one at most is inside
         passes = raw.valid & ~self.alone & walk.raw.ready
         enters = walk.raw.valid & walk.raw.ready
-        now = self.now
-        if self.derived.scan.waits:  # it goes on while a row is inside
-            now = Signal.like(self.now)
-            with m.If(enters):
-                m.d.sync += now.eq(self.now)
+        now = Signal.like(self.now)  # kept, as the port goes on while a row is inside
+        with m.If(enters):
+            m.d.sync += now.eq(self.now)
         if self.derived.skips:
             with m.If(enters):
                 m.d.sync += row.eq(raw.payload.y)
@@ -69,7 +67,7 @@ class TimedDebounce(wiring.Component):
 
 
 class _TimedSwitch(Switch):
-    """A switch's word: two bits of state, and the row time of its beginning; all zero while quiet."""
+    """A switch's word: two bits of state, and the time of its beginning; all zero while quiet."""
 
     def __init__(self, m: Module, now: Value):
         bits = len(now)

@@ -1,4 +1,4 @@
-"""Unrequested packets: a hello every half second for frames of uneven times, and a frame after a long pause."""
+"""Unrequested packets: a hello every half second with a scan that waits, and a frame after a long pause."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -8,14 +8,7 @@ from contactfpga.skin.derived import HELLO_BIT, KEEP_ALIVE_BIT
 
 def hello_period(m: Module, link: wiring.Component) -> Value:
     """Pulse every half second."""
-    if link.derived.scan.waits:
-        return _toggles(m, link, HELLO_BIT)
-    period = link.derived.hello_frames
-    since = Signal(range(max(2, period)))
-    waited, due = _wait(link, since, period)
-    with m.If(link.frames.decide):
-        m.d.sync += since.eq(Mux(due, 0, waited))
-    return link.frames.decide & due
+    return _toggles(m, link, HELLO_BIT)
 
 
 def keep_alive(m: Module, link: wiring.Component) -> None:
@@ -32,22 +25,12 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
         return
     limit = link.derived.keep_alive_frames
     pause = Signal(range(limit), init=limit - 1)  # since the last frame sent
-    waited, due = _wait(link, pause, limit)
-    m.d.comb += link.due.eq(due)
+    m.d.comb += link.due.eq(pause == limit - 1)
     with m.If(decide):
-        m.d.sync += pause.eq(Mux(sends, 0, waited))
+        m.d.sync += pause.eq(Mux(sends, 0, pause + 1))
 
 
 def _toggles(m: Module, link: wiring.Component, bit: int) -> Value:
     before = Signal(name=f"time_{bit}")
     m.d.sync += before.eq(link.time[bit])
     return link.time[bit] ^ before
-
-
-def _wait(link: wiring.Component, waited: Value, limit: int) -> tuple[Value, Value]:
-    """A waiting time with this frame's, and whether it has reached ``limit``: in scans, or in row times of uneven
-    scans."""
-    if link.derived.scan.even:
-        return waited + 1, waited == limit - 1
-    longer = waited + link.tag.slots
-    return longer, longer >= limit

@@ -92,7 +92,7 @@ class Link(wiring.Component):
         )
 
     def _hello_period(self, m: Module) -> Value:
-        if not self.derived.scan.even:
+        if self.derived.scan.waits:
             from contactfpga_hdl.link.due import hello_period
 
             return hello_period(m, self)

@@ -8,7 +8,6 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.choices import scans
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS, SAMPLE_AT, Derived
 from contactfpga.wire.command import VALUE_DIGITS
@@ -63,13 +62,11 @@ def first_row(skin: Skin) -> int:
 
 
 def row_driver(skin: Skin) -> wiring.Signature:
-    """Interface of a row driver to the scanner. Direct rows drive the first row at power-up; in an adaptive scan, all
-    rows.
+    """Interface of a row driver to the scanner. Direct rows drive the first row at power-up.
 
     pins (out): pins at the sheet.
     pattern (in): rows of the next slot as ones, stable from ``shift`` until ``drive``.
-    shift (in): pulse ``Derived.row_shift_clocks`` before the slot, unused by direct rows. A driven pattern may be
-        shifted again.
+    shift (in): pulse ``Derived.row_shift_clocks`` before the slot, unused by direct rows.
     drive (in): pulse in the last clock before the slot.
     release (in): pulse in the last clock in which rows are driven.
     upset (out): see :func:`scan_ports`.
@@ -119,8 +116,7 @@ class DirectRows(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin = self.skin
-        first = 1 << first_row(skin) if scans.find(skin.scan).even else (1 << skin.row_lines) - 1
-        selected = Signal(skin.row_lines, init=first)
+        selected = Signal(skin.row_lines, init=1 << first_row(skin))
         with m.If(self.drive):
             m.d.sync += selected.eq(self.pattern)
         with m.Elif(self.release):

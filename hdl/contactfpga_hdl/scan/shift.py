@@ -8,7 +8,6 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
-from contactfpga.choices import scans
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.lines import of_lines, on_lines
 from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
@@ -19,7 +18,7 @@ class RowChain(wiring.Component):
     pin follows ``drive`` and ``release`` by one clock.
 
     A whole pattern, highest line of each chain first, is shifted while the one before is driven, so a random state
-    lasts one pattern. The latch rises while no row, or the same rows, are driven.
+    lasts one pattern. The latch rises while no row is driven.
     """
 
     def __init__(self, skin: Skin):
@@ -46,10 +45,6 @@ class RowChain(wiring.Component):
                 m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
         with m.Else():
             m.d.sync += self.pins.row_latch.eq(0)
-        # A pattern that was shifted again, for idle rows, may not be in when they hit.
-        if not scans.find(self.skin.scan).even:
-            with m.If(self.release):
-                m.d.sync += [busy.eq(0), left.eq(lines), clock.eq(0)]
         with m.If(self.drive):
             m.d.sync += self.pins.row_enable_n.eq(0)
         with m.Elif(self.release):

@@ -13,7 +13,7 @@ from contactfpga.choices.choice import find as find_choice
 class Debounce(Choice):
     """A debounce of rows.
 
-    ``gateware`` counts scan periods, for even scans; ``timed_gateware`` counts row times, for others. ``golden``: a
+    ``gateware`` counts scan periods; ``timed_gateware`` counts us, for scans that wait. ``golden``: a
     :class:`contactfpga_sim.model.golden.debounce.DebounceRule`.
     """
 
@@ -22,7 +22,7 @@ class Debounce(Choice):
     """Whether a press counts only after ``debounce_press_us``."""
 
     def load_timed_gateware(self) -> Any:
-        """The gateware's class for uneven scans. Imports Amaranth."""
+        """The gateware's class for scans that wait. Imports Amaranth."""
         return load(self.timed_gateware)
 
 

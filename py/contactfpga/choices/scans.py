@@ -16,48 +16,25 @@ from contactfpga.errors import SkinError
 class Scan(Choice):
     """A scan that drives rows and samples columns.
 
-    ``gateware``: a component with the ports of :func:`contactfpga_hdl.scan.pins.scan_ports`; a scan that is not
-    ``even`` also has those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden``: a
+    ``gateware``: a component with the ports of :func:`contactfpga_hdl.scan.pins.scan_ports`; a scan that ``waits`` also
+    has those of :class:`contactfpga_hdl.scan.reversal.ReversalScanner`. ``golden``: a
     :class:`contactfpga_sim.model.golden.scan.ScanRule`.
     """
 
-    even: bool
-    """Whether every row is sampled once per frame and all frames take the same time. Otherwise times are counted in row
-    times, whose number each frame reports, or in us if the scan ``waits``."""
     reads_rows: bool
     """Whether rows are released and read while columns are driven, by bidirectional pins."""
     waits: bool
     """Whether the scan waits until the next stage takes a row, and begins a frame only when the last is packed, so that
-    no stage is too slow. With zones it passes on only driven rows, with their numbers."""
-    guards: bool = False
-    moves_sample: bool = False
-    """Whether the scan obeys the command "sample at", by the ports of
-    :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
+    no stage is too slow. With zones it passes on only driven rows, with their numbers. Times are then counted in us.
+    Otherwise every row is sampled once per frame, all frames take the same time, and times are counted in frames."""
     check: Callable[[Any], None]
-    """Raises SkinError if the scan cannot serve a Skin; called before anything is derived from the Skin."""
-    choice_clocks: Bound
-    """Clocks from a strobe until the next rows are known; 0 if known beforehand."""
-    max_frame_slots: Bound
+    """Raises SkinError if the scan cannot serve a Skin, such as one with ``guard`` if it checks no guard lines; called
+    before anything is derived from the Skin."""
     max_frame_clocks: Bound
     """The most clocks of a frame, from first to last sample."""
     min_row_clocks: Bound
     """The least clocks of a row time with which later stages keep up; the scanner keeps its tag until the frame before
     is packed."""
-
-
-def _check_adaptive(skin: Any) -> None:
-    if skin.rows < 2:
-        raise SkinError(f"rows is {skin.rows}; scan = 'adaptive' needs at least 2")
-    if skin.column_read != "direct":
-        raise SkinError(
-            f"column_read is {skin.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
-            "the columns of an untouched sheet in each clock"
-        )
-    if skin.precharge_us:
-        raise SkinError(
-            f"precharge_us is {skin.precharge_us}; scan = 'adaptive' keeps rows driven and cannot drive the columns, "
-            "scan = 'reversal' can"
-        )
 
 
 def _check_reversal(skin: Any) -> None:
@@ -83,27 +60,7 @@ def _raster_min_row_clocks(derived: Any) -> int:
     return least
 
 
-def _adaptive_min_row_clocks(derived: Any) -> int:
-    rows = derived.skin.rows
-    handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
-    least: int = max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
-    return least
-
-
-def _adaptive_packing_clocks(derived: Any, pressed: int) -> int:
-    skin = derived.skin
-    if not derived.report.zones:
-        items = skin.rows
-    elif skin.connectivity == 8:
-        items = min(pressed, math.ceil(skin.rows / 2)) * math.ceil(skin.columns / 2)
-    else:
-        items = math.ceil(pressed * skin.columns / 2)
-    clocks = derived.packed_clocks + skin.rows + derived.items_clocks(min(items, derived.max_items))
-    least: int = math.ceil(clocks / min(pressed + 1, skin.rows))
-    return least
-
-
-ScanName = Literal["raster", "adaptive", "reversal"]
+ScanName = Literal["raster", "reversal"]
 
 SCANS: dict[str, Scan] = {
     scan.name: scan
@@ -113,44 +70,20 @@ SCANS: dict[str, Scan] = {
             title="raster",
             gateware="contactfpga_hdl.scan.raster:Scanner",
             golden="contactfpga_sim.model.golden.raster:RASTER",
-            even=True,
             reads_rows=False,
             waits=False,
-            guards=True,
-            moves_sample=True,
             check=lambda skin: None,
-            choice_clocks=lambda derived: 0,
-            max_frame_slots=lambda derived: derived.skin.row_lines,
             max_frame_clocks=lambda derived: derived.frame_clocks,
             min_row_clocks=_raster_min_row_clocks,
-        ),
-        Scan(
-            name="adaptive",
-            title="adaptive",
-            gateware="contactfpga_hdl.scan.adaptive:AdaptiveScanner",
-            golden="contactfpga_sim.model.golden.adaptive:ADAPTIVE",
-            even=False,
-            reads_rows=False,
-            waits=False,
-            check=_check_adaptive,
-            choice_clocks=lambda derived: max(derived.row_levels, 2) + 4,
-            max_frame_slots=lambda derived: derived.skin.rows + 2 * derived.row_levels + 2,
-            max_frame_clocks=lambda derived: derived.max_frame_slots * derived.row_clocks,
-            min_row_clocks=_adaptive_min_row_clocks,
         ),
         Scan(
             name="reversal",
             title="reversal",
             gateware="contactfpga_hdl.scan.reversal:ReversalScanner",
             golden="contactfpga_sim.model.golden.reversal:REVERSAL",
-            even=False,
             reads_rows=True,
             waits=True,
-            guards=True,
-            moves_sample=True,
             check=_check_reversal,
-            choice_clocks=lambda derived: 0,
-            max_frame_slots=lambda derived: math.ceil(derived.max_frame_clocks / derived.row_clocks),
             max_frame_clocks=_reversal_frame_clocks,
             min_row_clocks=lambda derived: 1,
         ),
@@ -159,4 +92,9 @@ SCANS: dict[str, Scan] = {
 
 
 def find(value: object) -> Scan:
+    if isinstance(value, str) and value == "adaptive":
+        raise SkinError(
+            "scan is 'adaptive', which no longer exists; use 'reversal' with precharge_us if the pins can drive and "
+            "read both rows and columns, otherwise 'raster'"
+        )
     return find_choice(Scan, SCANS, value)

@@ -119,8 +119,8 @@ class Board(BoardFacts):
         in this way. Until the value is 0 again, or the board restarts, slower cells do not read pressed.
 
         0, larger values than the settle time, and values too early for the board (less than 2 clocks, or than shift
-        registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"`` and
-        ``scan = "raster"`` or ``"reversal"`` take it.
+        registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"``
+        take it.
         """
         return self.command(SAMPLE_AT, clocks, timeout)
 

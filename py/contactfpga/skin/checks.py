@@ -130,10 +130,6 @@ def _check_order(skin: Skin, kind: str) -> tuple[int, ...]:
 def _check_guard(skin: Skin) -> None:
     if skin.guard and skin.ghosts:
         raise SkinError("diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'")
-    if skin.guard and not scans.find(skin.scan).guards:
-        raise SkinError(
-            f"scan is {skin.scan!r}, which does not look at guard lines; guard = true needs 'raster' or 'reversal'"
-        )
     if skin.self_test and not skin.reads_rows:
         raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
 
@@ -236,10 +232,9 @@ def check_timing(skin: Skin) -> None:
         if derived.clocks(getattr(skin, name)) < 1:
             raise SkinError(f"{name} is {getattr(skin, name)}; it must be at least one clock, {1 / megahertz:g} us")
     if derived.row_clocks < derived.min_row_clocks:
-        rows = "" if derived.scan.even else f"{skin.rows} rows, "
         divided = f" and report = {skin.report!r}" if derived.report.divided else ""
         raise SkinError(
-            f"settle_us + release_us is {derived.row_clocks} clocks; {rows}{skin.columns} columns and "
+            f"settle_us + release_us is {derived.row_clocks} clocks; {skin.columns} columns and "
             f"{skin.zone_capacity} zones per frame need {derived.min_row_clocks} clocks "
             f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
         )
@@ -259,8 +254,7 @@ def _check_keep_alive(skin: Skin, derived: Derived) -> None:
         )
     if not derived.scan.waits and derived.keep_alive_frames < 1:
         raise SkinError(
-            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes up to "
-            f"{derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
+            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes {derived.frame_clocks / skin.clock_hz * 1e3:g} ms"
         )
 
 

@@ -191,8 +191,7 @@ class Derived(Widths):
     @property
     def commands(self) -> tuple[int, ...]:
         self_test = (SELF_TEST,) if self.skin.self_test else ()
-        moves = self.scan.moves_sample and not self.report.zones
-        return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
+        return self_test + (() if self.report.zones else (SAMPLE_AT,)) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:
@@ -221,13 +220,10 @@ class Derived(Widths):
 
     @property
     def release_clocks(self) -> int:
-        """Clocks without a driven row: at least until the columns are shifted, and the next row is chosen, shifted and
-        latched.
-        """
+        """Clocks without a driven row: at least until the columns are shifted and the next row is latched."""
         column = self.column_load_clocks + self.column_shift_clocks
-        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
-        return max(self.clocks(self.skin.release_us), column, row, precharge)
+        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks, precharge)
 
     @property
     def precharge_clocks(self) -> int:
@@ -269,16 +265,6 @@ class Derived(Widths):
         return self.column_chain_lines * self.column_load_clocks
 
     @property
-    def row_levels(self) -> int:
-        """ceil(log2 rows): the halvings of the rows until one is left."""
-        return (self.skin.rows - 1).bit_length()
-
-    @property
-    def choice_clocks(self) -> int:
-        """Clocks from a strobe until the scan can drive its next rows; 0 if it knows them beforehand."""
-        return self.scan.choice_clocks(self)
-
-    @property
     def row_chain_lines(self) -> int:
         return math.ceil(self.skin.row_lines / self.skin.row_chains)
 
@@ -288,7 +274,7 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """Clocks in which every row, and a guard row, is driven once. Frames of an adaptive scan vary."""
+        """Clocks in which every row, and a guard row, is driven once."""
         return self.row_clocks * self.skin.row_lines
 
     @property
@@ -300,10 +286,6 @@ class Derived(Widths):
         return pulsed(self.skin.clock_hz, self.skin.baud)
 
     # ---- times, in clocks unless named otherwise
-
-    @property
-    def max_frame_slots(self) -> int:
-        return self.scan.max_frame_slots(self)
 
     @property
     def max_frame_clocks(self) -> int:
@@ -340,11 +322,8 @@ class Derived(Widths):
 
     @property
     def keep_alive_frames(self) -> int:
-        """Scans within which a frame is sent; row times for frames of varying length."""
-        clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
-        if self.scan.even:
-            return math.floor(clocks / self.frame_clocks + 1e-9)
-        return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
+        """Scans within which a frame is sent, unless the scan waits."""
+        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / self.frame_clocks + 1e-9)
 
     @property
     def keep_alive_toggles(self) -> int:
@@ -361,9 +340,8 @@ class Derived(Widths):
 
     @property
     def hello_frames(self) -> int:
-        """Scans after which a hello is due; row times for frames of varying length."""
-        periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
-        return periods if self.scan.even else periods * self.skin.rows
+        """Scans after which a hello is due, unless the scan waits."""
+        return max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
 
     @property
     def press_scans(self) -> int:
@@ -375,28 +353,21 @@ class Derived(Widths):
 
     @property
     def press_ticks(self) -> int:
-        """Ticks of ``debounce_press_us``: row times, or us with a waiting scan (docs/timing.md)."""
-        return self._debounce_ticks(self.skin.debounce_press_us, self.press_scans)
+        """Steps of the us clock that ``debounce_press_us`` lasts with a waiting scan (docs/timing.md)."""
+        return _ticks(self.skin.debounce_press_us)
 
     @property
     def release_ticks(self) -> int:
-        return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
-
-    def _debounce_ticks(self, us: float, scans: int) -> int:
-        if self.scan.waits:
-            return whole(us) + 1 if us else 0
-        return max(0, (scans - 1) * self.skin.rows + 1)
+        return _ticks(self.skin.debounce_release_us)
 
     # ---- widths in bits and sizes in bytes
 
     @functools.cached_property
     def tick_bits(self) -> int:
-        """Bits of a counter of ticks for a debounce time and two frames."""
+        """Bits of the us clock, with a waiting scan, for a debounce time and two frames."""
         longest = max(self.press_ticks, self.release_ticks)
-        if self.scan.waits:
-            frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
-            return (longest + 2 * math.ceil(frame / self.clocks_per_us)).bit_length()
-        return (longest + 2 * self.max_frame_slots).bit_length()
+        frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
+        return (longest + 2 * math.ceil(frame / self.clocks_per_us)).bit_length()
 
     @property
     def cell_bits(self) -> int:
@@ -441,17 +412,20 @@ class Derived(Widths):
         """Items that the queue before the packer holds.
 
         Two rows close at most ``open_zones`` zones, in one burst; if packing takes longer than two rows, the rest
-        accumulates over at most two frames. An adaptive scan omits empty rows, so every row may close as many zones,
-        and bitmap rows of two frames may wait. A waiting scan has one frame under way; its depth is a power of two,
-        which needs less logic.
+        accumulates over at most two frames. A waiting scan has one frame under way; its depth is a power of two, which
+        needs less logic.
         """
         if self.scan.waits:
             return max(8, 1 << (self.max_items - 1).bit_length())
         if not self.report.zones:
-            return 4 if self.scan.even else 2 * self.skin.rows + 2
+            return 4
         busy = self.open_zones * self.item_clocks
-        late = max(0.0, 1 - (2 if self.scan.even else 1) * self.row_clocks / busy)
+        late = max(0.0, 1 - 2 * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
+
+
+def _ticks(us: float) -> int:
+    return whole(us) + 1 if us else 0
 
 
 def whole(value: float) -> int:

@@ -74,8 +74,8 @@ class Skin:
     without diodes; zones that may be ghosts are flagged.
     """
     scan: ScanName | Scan = "raster"
-    """``raster`` drives one row after the other; ``adaptive`` drives untouched rows together; ``reversal`` drives all
-    columns and reads the rows, and then drives only touched rows."""
+    """``raster`` drives one row after the other; ``reversal`` drives all columns and reads the rows, and then drives
+    only touched rows."""
     settle_us: float = field(default=5.0, metadata={"limits": (0.0, 10_000.0, "us")})
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = field(default=1.0, metadata={"limits": (0.0, 10_000.0, "us")})

@@ -322,8 +322,6 @@ _ALL = (
             "bridges": Section(
                 "bridges:bridge_table", kept="1 ms, 0.*reference", page="boards.md", sample="bridges:bridge_sample"
             ),
-            "gain": Section("scans:scenes_gain_table", sample="scans:scenes_gain_table", kept="fingertip|palm|sole"),
-            "recorded": Section("scans:recorded_gain_table", needs=("../shared/data",), kept=NO_ROW),
             "labeller_recorded": Section("labellers:recordings_table", needs=("../shared/data",), kept=NO_ROW),
         },
     ),

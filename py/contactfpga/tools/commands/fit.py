@@ -9,8 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from contactfpga.choices import labellers
-from contactfpga.choices.scans import SCANS
+from contactfpga.choices import labellers, scans
 from contactfpga.design.cover import load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
@@ -95,8 +94,8 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
     tried.add_argument("--foam-mm", type=numbers.number(0.01, 1000, "mm"), metavar="MM", default=2.0, help=foam)
     labeller = "Try only this labeller, cells, or module:attribute of your own; can be repeated."
     tried.add_argument("--labeller", action="append", metavar="NAME", help=labeller)
-    scans = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
-    tried.add_argument("--scan", action="append", metavar="NAME", help=scans)
+    scan = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
+    tried.add_argument("--scan", action="append", metavar="NAME", help=scan)
     baud = "Try this baud rate; can be repeated (default: the Skin's)."
     tried.add_argument("--baud", type=numbers.BAUD, action="append", metavar="N", help=baud)
     host = "Accept bitmaps too: the host finds their zones in this time."
@@ -153,7 +152,7 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
         candidates.pitches_for(base, sources, args.pitch_mm),
         candidates.size_for(base, sources),
         _methods(args.labeller),
-        flags.known("--scan", args.scan, list(SCANS)) if args.scan else None,
+        [scans.find(name).name for name in args.scan] if args.scan else None,
         args.baud,
         covers,
     )

@@ -132,7 +132,7 @@ def _skin(text: str) -> Skin | None:
         values = tomlfile.parse(text.encode(), "the Skin of a recording", SkinError)
         refuse_modules(values, "a recording")
         return Skin(**values) if text else None
-    except (TypeError, ValueError):  # of a later version, or with a module; the hello is known all the same
+    except (TypeError, ValueError):  # of another version, or with a module; the hello is known all the same
         return None
 
 

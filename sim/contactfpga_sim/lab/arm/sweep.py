@@ -115,7 +115,7 @@ def _thinnest(task: SweepTask) -> SweepPoint:
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
     """Longest time in s from a switch to the controller's input by each way, for one zone."""
     usb = case.usb
-    scan = skin.derived.max_frame_slots * skin.derived.row_clocks / skin.clock_hz
+    scan = skin.derived.max_frame_clocks / skin.clock_hz
     wire = latency_s(skin)
     return {"pin": scan + AROUND_S, "UART": wire + usb.timer_s + usb.frame_s + usb.host_s, "last byte": wire}
 

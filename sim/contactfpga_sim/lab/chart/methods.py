@@ -73,7 +73,7 @@ def _settings() -> dict[str, Method]:
     found: dict[str, Method] = {}
     for name, more, settings in ways:
         found |= under("tiles", name, PITCH_MM, more, **settings)
-    return found | under("tiles", "adaptive", 10.0, scan="adaptive")  # 25 lines would need a longer row time
+    return found
 
 
 def _reversal() -> dict[str, Method]:

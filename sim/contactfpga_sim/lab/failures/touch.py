@@ -26,7 +26,6 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     seen,
 )
-from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
@@ -161,10 +160,9 @@ MOVING = Knob(
     values=(0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
         "`raster`": Rated(functools.partial(_moving, REFERENCE, None), most=480),
-        "`adaptive`": Rated(functools.partial(_moving, adaptive_skin(16, 16), None), most=480),
         "starter kit, 10 N": Rated(functools.partial(_moving, STARTER.skin, COVER), most=480),
     },
-    helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
+    helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time",
     unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is "
     "it flagged",
 )

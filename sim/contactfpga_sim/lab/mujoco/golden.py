@@ -83,8 +83,6 @@ class GoldenBoard:
             requested=len(answered) > self._asked,
             heard=last_number(requests, begun) % 8,
             told=0,
-            slots=known.rows,
-            alone=frozenset(),
         )
         self._asked = len(answered)
         if known.zones:

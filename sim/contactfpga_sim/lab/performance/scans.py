@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,23 +10,13 @@ import numpy as np
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import latency, writer
-from contactfpga_sim.lab.sheets import adaptive_skin
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
-from contactfpga_sim.model.golden import Timeline
-from contactfpga_sim.model.golden.adaptive import AdaptiveScanModel
-from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.scenes.recordings import Recording
-from contactfpga_sim.model.scenes.scene import CONTACTS
 
 INSTANTS = 96
 
 RECORDINGS = Path("../shared/data")
-
-RECORDED = 100
-
-HELD_SCANS = 4
-"""Scan periods that a frame is held; a recorded sheet holds it longer."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -134,59 +123,9 @@ def report_row(name: str, skin: Skin) -> str:
     return writer.line((name, f"`{skin.report}`", str(skin.derived.record_bytes), *times))
 
 
-def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
-    """Frame time of an adaptive scan, and its speedup over a raster scan, for scenes of (n, R, C) bool frames."""
-    head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
-    return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
-
-
-def gain_row(name: str, frames: np.ndarray) -> str:
-    """A row of :func:`gain_table`. Each frame is held for some scans, so most see a sheet at rest. The mean is at a
-    random instant."""
-    _, rows, columns = frames.shape
-    known = facts(adaptive_skin(rows, columns))
-    hold = HELD_SCANS * known.scan_clocks
-    scanner = AdaptiveScanModel(
-        known, Timeline([(index * hold, cells, None) for index, cells in enumerate(frames)]), []
-    )
-    ends: list[int] = []
-    while not ends or ends[-1] < len(frames) * hold:
-        scanner.frame()
-        ends.append(scanner.slots[-1].end)
-    us = np.diff(ends, prepend=0) / known.clocks_per_us
-    scan_us = known.scan_clocks / known.clocks_per_us
-    mean = (us**2).sum() / us.sum()
-    active = frames.any(axis=2).sum(axis=1).mean()
-    times = (f"{scan_us:.0f} us", f"{mean:.1f} / {us.max():.1f} us", f"{scan_us / mean:.1f}")
-    return writer.line((name, f"{rows}x{columns}", f"{known.clocks_per_us} MHz", f"{active:.1f}", *times))
-
-
-def built_in_scenes() -> dict[str, np.ndarray]:
-    """(n, 16, 16) frames of every contact scene, 50 over half a second of the moving one."""
-    skin = adaptive_skin(16, 16)
-    times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
-    return {
-        f"`{name}`": np.stack([make(skin).pressed(float(t), skin) for t in times[name]])
-        for name, make in CONTACTS.items()
-    }
-
-
 def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     """(n, R, C) bool frames of each recording in the folder."""
     return {path.name.partition(".")[0]: Recording.load(path).pressed for path in sorted(folder.glob("*.npz"))}
-
-
-def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
-    """Evenly spaced frames of each recording in the folder."""
-    return {name: frames[:: max(1, len(frames) // RECORDED)][:RECORDED] for name, frames in recordings(folder).items()}
-
-
-def scenes_gain_table() -> str:
-    return gain_table(built_in_scenes())
-
-
-def recorded_gain_table() -> str:
-    return gain_table(recorded_scenes())
 
 
 def reference_sample() -> str:

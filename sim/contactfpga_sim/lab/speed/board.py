@@ -14,7 +14,6 @@ from contactfpga_sim.model.board.virtual import VirtualBoard
 SKINS = {
     "reference": Skin(),
     "`serial`": Skin(labeller="serial"),
-    "`adaptive`": Skin(scan="adaptive"),
     "32x32": Skin(rows=32, columns=32),
     "64x64": Skin(rows=64, columns=64),
 }

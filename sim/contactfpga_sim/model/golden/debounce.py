@@ -69,7 +69,7 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 
 
 class TimedDebounce:
-    """Debounce for samples that are not a scan apart; ticks are row times or us.
+    """Debounce for a scan that waits, by samples that are not a scan apart; ticks are steps of the us clock.
 
     A time ends at the first sample at least ``press`` or ``release`` ticks after its beginning.
     """
@@ -80,7 +80,7 @@ class TimedDebounce:
         self._switches: dict[tuple[int, int], SwitchState] = {}
 
     def take(self, cells: np.ndarray, ticks: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
-        """Take (R, C) bool samples of a frame; ``ticks``: sample times of rows driven alone.
+        """Take (R, C) bool samples of a frame; ``ticks``: sample times of driven rows.
 
         Returns the switches' states, and the rows with a pressed switch or a running time.
         """

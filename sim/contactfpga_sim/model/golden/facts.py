@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import dataclasses
 import functools
 import hashlib
@@ -34,21 +33,16 @@ def downwards(value: Fraction) -> int:
     return math.floor(value + Fraction(1, 10**9))
 
 
-class ScanTiming(abc.ABC):
+def _ticks(us: Fraction) -> int:
+    return upwards(us) + 1 if us else 0
+
+
+class ScanTiming:
     """The part of a scan's golden rule that clocks and widths need."""
 
-    even: bool
-    """Whether every frame takes the same time and every row once."""
     waits: bool
-    """Whether the scan waits for later stages, and the link counts time."""
-
-    @abc.abstractmethod
-    def choice(self, facts: Facts) -> int:
-        """Clocks that the scan needs to choose its next rows."""
-
-    @abc.abstractmethod
-    def frame_slots(self, facts: Facts) -> int:
-        """Most row times of a frame."""
+    """Whether the scan waits for later stages, and the link counts time; otherwise every frame takes the same time and
+    every row once."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +99,7 @@ class Facts:
     @property
     def samples_early(self) -> bool:
         """Whether columns can be sampled before the settle time ends."""
-        return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
+        return self.skin.report == "cells"
 
     @property
     def first_sample(self) -> int:
@@ -148,25 +142,11 @@ class Facts:
         return found
 
     @functools.cached_property
-    def halvings(self) -> int:
-        """ceil(log2 R)."""
-        return math.ceil(math.log2(self.rows))
-
-    @functools.cached_property
-    def choice(self) -> int:
-        return self.scan.choice(self)
-
-    @functools.cached_property
-    def frame_slots(self) -> int:
-        return self.scan.frame_slots(self)
-
-    @functools.cached_property
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
-        chosen = self.choice + self.row_shift if self.choice else 0
         charged = 1 + self.precharge + 1 if self.precharge else 0
-        return max(asked, self.load + self.column_shift, latch, chosen, charged)
+        return max(asked, self.load + self.column_shift, latch, charged)
 
     @functools.cached_property
     def precharge(self) -> int:
@@ -216,12 +196,9 @@ class Facts:
         return upwards(self._scans(exact(self.skin.debounce_release_us)))
 
     @functools.cached_property
-    def keep_alive_slots(self) -> int:
-        """Row times after which an unchanged frame is sent."""
-        if self.scan.even:
-            return self.row_lines * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
-        row_us = Fraction(self.row_clocks, self.clocks_per_us)
-        return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
+    def keep_alive_scans(self) -> int:
+        """Scans after which an unchanged frame is sent."""
+        return downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
 
     @property
     def keep_alive_periods(self) -> int:
@@ -231,22 +208,17 @@ class Facts:
 
     @functools.cached_property
     def press_ticks(self) -> int:
-        """Press time in row times; for a scan that waits in us."""
-        return self._ticks(exact(self.skin.debounce_press_us), self.press_scans)
+        """Press time in steps of the us clock, for a scan that waits."""
+        return _ticks(exact(self.skin.debounce_press_us))
 
     @functools.cached_property
     def release_ticks(self) -> int:
-        return self._ticks(exact(self.skin.debounce_release_us), self.release_scans)
-
-    def _ticks(self, us: Fraction, scans: int) -> int:
-        if self.scan.waits:
-            return upwards(us) + 1 if us else 0
-        return max(0, (scans - 1) * self.rows + 1)
+        return _ticks(exact(self.skin.debounce_release_us))
 
     @functools.cached_property
-    def hello_slots(self) -> int:
-        """Row times after which a hello is due."""
-        return self.row_lines * max(1, math.floor(self._scans(Fraction(500_000))))
+    def hello_scans(self) -> int:
+        """Scans after which a hello is due."""
+        return max(1, math.floor(self._scans(Fraction(500_000))))
 
     def _scans(self, microseconds: Fraction) -> Fraction:
         return microseconds * self.clocks_per_us / self.scan_clocks

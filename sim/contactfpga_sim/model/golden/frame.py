@@ -72,8 +72,8 @@ class Packer:
         taken = max(self._free, items.end + 2)
         self._queue.pass_end(taken)
         self._link.advance(taken)
-        self._since_sent += items.scan.slots
-        self._since_hello += items.scan.slots
+        self._since_sent += 1
+        self._since_hello += 1
         if self._is_sent(items, taken):
             self._send(packet, items, taken)
             self._since_sent = 0
@@ -82,7 +82,7 @@ class Packer:
         else:
             self._free = taken + 1
         self._before, self._fault_before = items.cells, items.scan.fault
-        if not self._facts.scan.waits and self._since_hello >= self._facts.hello_slots:
+        if not self._facts.scan.waits and self._since_hello >= self._facts.hello_scans:
             self._link.want_hello(taken + 1)
             self._since_hello = 0
         return self._free
@@ -93,7 +93,7 @@ class Packer:
         changed = items.scan.fault != self._fault_before or not np.array_equal(items.cells, self._before)
         if self._facts.scan.waits:
             return changed or taken >= self.due
-        return changed or self._since_sent >= self._facts.keep_alive_slots
+        return changed or self._since_sent >= self._facts.keep_alive_scans
 
     def _send(self, packet: Packet, items: Items, taken: int) -> None:
         self._overwritten += self._link.drop()

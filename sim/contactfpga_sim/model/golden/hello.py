@@ -74,9 +74,9 @@ class State:
         return min(7, self._stuck(cycle)) if place == 14 else 0
 
     def _epoch(self, taken: int) -> int:
-        even = self._facts.scan.even
-        late = self._facts.column_shift + (self._facts.rows - 1) * self._facts.row_clocks if even else 0
-        return max(0, taken - 1 - late) // self._facts.clocks_per_us // 2**22
+        facts = self._facts
+        late = 0 if facts.scan.waits else facts.column_shift + (facts.rows - 1) * facts.row_clocks
+        return max(0, taken - 1 - late) // facts.clocks_per_us // 2**22
 
     def _stuck(self, cycle: int) -> int:
         index = bisect.bisect_right(self._scanned, cycle, key=lambda scan: scan.told)

@@ -119,7 +119,7 @@ class Pipeline:
         """Cycles in which a frame was packed or an untouched sheet checked."""
         self._free = 0
         self._handed = -1
-        self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
+        self._late = facts.columns + 3 if facts.debounced else 0  # a driven row; the others pass
 
     def tell(self, cycle: int, faults: int) -> None:
         if faults != (self.told[-1][1] if self.told else 0):
@@ -140,7 +140,7 @@ class Pipeline:
         handed = []
         for row, offered in enumerate(one.offered):
             last = row == self._facts.rows - 1
-            handed.append(self.hand_over(self.taken(offered), cells[row], row in one.alone, last))
+            handed.append(self.hand_over(self.taken(offered), cells[row], True, last))
             if self._facts.zones:
                 self.keep_busy(handed[-1] + work.busy[row])
         self.end(one, cells, cells, range(self._facts.rows), handed, work)
@@ -162,7 +162,7 @@ class Pipeline:
         return max(offered, self._handed + 1)
 
     def hand_over(self, taken: int, cells: np.ndarray, alone: bool, last: bool, earliest: int = 0) -> int:
-        """Hand over a taken row, through the debounce if driven alone; returns the cycle."""
+        """Hand over a taken row, through the debounce if it was driven (``alone``); returns the cycle."""
         cycle = max(taken + self._late * alone, self._free, earliest)
         self._handed = cycle
         self._trace.rows.append((cycle, _word(cells), last))

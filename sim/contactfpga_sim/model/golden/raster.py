@@ -19,14 +19,7 @@ from contactfpga_sim.model.golden.trace import Timeline
 class Raster(ScanRule):
     """Row after row, each for the same time."""
 
-    even = True
     waits = False
-
-    def choice(self, facts: Facts) -> int:
-        return 0
-
-    def frame_slots(self, facts: Facts) -> int:
-        return facts.row_lines
 
     def scan(self, play: Play) -> ScanOutput:
         facts, frames = play.facts, play.cycles // play.facts.scan_clocks + 1
@@ -84,8 +77,6 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
                 requested=any(early <= request.cycle < late for request in requests),
                 heard=last_number(requests, late) % 8,
                 told=strobe(facts, slots[-1]) + 2,
-                slots=facts.row_lines,
-                alone=frozenset(range(facts.rows)),
             )
         )
     return result

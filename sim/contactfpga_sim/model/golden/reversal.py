@@ -113,8 +113,6 @@ class ReversalScanModel:
             requested=any(one.cycle < begun for one in self._waiting()),
             heard=last_number(self._requests, begun) % 8,
             told=begun + 3,
-            slots=0,
-            alone=frozenset(todo),
             faults=self._word,
         )
         self.begun.append(begun)
@@ -284,14 +282,7 @@ class ReversalScanModel:
 class Reversal(ScanRule):
     """Line reversal: the touched rows, one by one."""
 
-    even = False
     waits = True
-
-    def choice(self, facts: Facts) -> int:
-        return 0
-
-    def frame_slots(self, facts: Facts) -> int:
-        return facts.rows + -(-facts.project // facts.row_clocks)
 
     def scan(self, play: Play) -> ScanOutput:
         scanner, facts = ReversalScanModel(play), play.facts

@@ -33,9 +33,6 @@ class Scan:
     """Lowest three bits of the last request's number; 0 without any."""
     told: int
     """Cycle from which a hello reports the stuck columns."""
-    slots: int
-    """Duration in row times."""
-    alone: frozenset[int]
     faults: int = 0
     """:attr:`contactfpga_sim.model.golden.guard.FaultyLines.word` at the end."""
 
@@ -114,7 +111,7 @@ class Play:
     stages: Stages
 
 
-class ScanRule(ScanTiming):
+class ScanRule(ScanTiming, abc.ABC):
     """The golden rule of a scan."""
 
     @abc.abstractmethod

@@ -44,14 +44,6 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "keep_alive_scans": (1, 3, 1000),
 }
 
-ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
-    "scan": ("adaptive",),
-    "sheet": ((2, 1), (2, 9), (9, 1), (5, 7), (12, 4), (16, 16), (33, 3)),
-    "column_chains": (0,),
-    "precharge_us": (0.0,),
-}
-"""Choices for the adaptive scan, with columns on pins of their own."""
-
 REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("reversal",),
     "row_chains": (0,),
@@ -143,7 +135,7 @@ def pairs_in(rows: list[list[int]]) -> set[Pair]:
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
-    """Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE`, :data:`REVERSAL` or :func:`closed` ones."""
+    """Skin for an assignment of :data:`CHOICES`, :data:`REVERSAL` or :func:`closed` ones."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
     values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
@@ -173,9 +165,8 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     scan_us = known.scan_clocks / megahertz
     press, back = choice["debounce_scans"]
     values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
-    frame_us = known.frame_slots * known.row_clocks / megahertz
     least = known.skin.derived.min_keep_alive_ms if known.scan.waits else 0.0
-    values["keep_alive_ms"] = min(100.0, least + (choice["keep_alive_scans"] + 0.5) * frame_us / 1000)
+    values["keep_alive_ms"] = min(100.0, least + (choice["keep_alive_scans"] + 0.5) * scan_us / 1000)
     return Skin(**values)
 
 

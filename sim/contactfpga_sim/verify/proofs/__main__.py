@@ -6,7 +6,6 @@ import time
 
 from contactfpga.tools.console import interrupt
 from contactfpga_sim.verify.proofs import (
-    adaptive,
     dual,
     label,
     label_serial,
@@ -35,7 +34,6 @@ from contactfpga_sim.verify.proofs.case import ProofCase
 CASES: tuple[ProofCase, ...] = (
     *scan.CASES,
     *raster_guard.CASES,
-    *adaptive.CASES,
     *precharge.CASES,
     *reversal.CASES,
     *reversal_frames.CASES,

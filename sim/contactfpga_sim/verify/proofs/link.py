@@ -225,7 +225,7 @@ _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search
 
 
 def first_is_sent(proof: Proof, **changes: Any) -> None:
-    """Free: decisions about frames, and frames' contents. Given: each frame needed a row time or more.
+    """Free: decisions about frames, and frames' contents.
 
     Claimed: no frame is dropped before one was sent. So after a restart a frame is packed before any is dropped, and
     ``contact`` can wait for its ``commit``. Nor is a frame dropped whose flag for faults differs from that of the frame
@@ -237,8 +237,6 @@ def first_is_sent(proof: Proof, **changes: Any) -> None:
         proof.m.d.comb += Value.cast(port).eq(proof.free(Value.cast(port).shape(), name))
     decide, sends = dut.frames.decide, dut.frames.verdict.send
     proof.m.d.comb += decide.eq(proof.free(1, "decide"))
-    if changes["scan"] == "adaptive":
-        proof.given(dut.tag.slots != 0)
     sent = Signal(name="sent_one")
     proof.m.d.sync += sent.eq(sent | decide & sends)
     proof.claim(~decide | sends | sent)
@@ -328,7 +326,6 @@ CASES = (
     ProofCase("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
               _BUGS, bug_clocks=40),
     ProofCase("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
-    ProofCase("the first frame is sent", "adaptive", partial(first_is_sent, scan="adaptive"), 2),
     ProofCase("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
     ProofCase("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
     ProofCase("digits are the counts", "epoch", partial(digits_are_the_counts, counter="epoch"), 2, _ODOMETER_BUGS,

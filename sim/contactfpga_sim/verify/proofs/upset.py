@@ -12,7 +12,6 @@ from contactfpga_sim.verify.proofs.proof import Proof
 
 SKINS = {
     "raster": Skin(rows=4, columns=2, settle_us=1, zone_capacity=1),
-    "adaptive": Skin(rows=4, columns=2, scan="adaptive", zone_capacity=1),
     "reversal": Skin(rows=4, columns=2, scan="reversal", precharge_us=0.5, zone_capacity=1),
 }
 
@@ -41,7 +40,7 @@ def _bugs(scan: str) -> tuple[Bug, ...]:
 
     slot = Bug("a bit of the slot's row flips", Scanner, "following",
         lambda rows, inside: rows ^ inside.component.request << 1)  # fmt: skip
-    return (time(0), time(7), *{"raster": (slot, _ROW), "adaptive": (_ROW,), "reversal": ()}[scan])
+    return (time(0), time(7), *((slot, _ROW) if scan == "raster" else ()))
 
 
 CASES = tuple(
