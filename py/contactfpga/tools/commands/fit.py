@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 import sys
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     flags.workers(parser)
     flags.output(parser, "Write the Skin to this TOML file.")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flags.json(parser)
 
 
 def _goal_flags(goals: argparse._ArgumentGroup) -> None:
@@ -115,11 +114,8 @@ def run(args: argparse.Namespace) -> int:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
             found = fit(task, tried, executor, step, so_far)
     except KeyboardInterrupt:
-        raise Interruption(_kept(so_far, len(tried), args.json)) from None
-    if args.json:
-        print(json.dumps(show.plain(found)), flush=True)
-    else:
-        show.printed(found)
+        raise Interruption(_kept(so_far, len(tried), args)) from None
+    results.show(args, show.plain(found), lambda: show.printed(found))
     if output and found.answer:
         command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
         write_text(output, show.toml(found, command))
@@ -191,14 +187,11 @@ def _share(percent: float | None) -> float | None:
     return None if percent is None else percent / 100
 
 
-def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
+def _kept(so_far: SoFar, of: int, args: argparse.Namespace) -> str:
     from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"
     if not so_far:
         return f"interrupted before the first of {of} candidates was measured; {again}"
-    if as_json:
-        print(json.dumps(show.plain_so_far(so_far.values())), flush=True)
-    else:
-        show.printed_so_far(so_far.values())
+    results.show(args, show.plain_so_far(so_far.values()), lambda: show.printed_so_far(so_far.values()))
     return f"interrupted; of {of} candidates {len(so_far)} were measured, and no answer was chosen; {again}"

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga import boards, terminal
+from contactfpga import boards
 from contactfpga.driver import health
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.finger.stages import Finger
@@ -43,7 +42,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--exact", action="store_true", help=exact)
     picture = "Draw a bar for each stage, SVG or PNG by the ending."
     parser.add_argument("--picture", metavar="FILE", help=picture)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flags.json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,13 +64,9 @@ def run(args: argparse.Namespace) -> int:
 
         sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud"
         picture.save(found, f"{sheet}, {board.bridge.chip} of {board.title}", path)
-    if args.json:
-        print(json.dumps(found.as_json()))
-        return 0
-    for title, what in (*_board_lines(skin, args.cells, found), *_host_lines(board.title, found, args.exact)):
-        terminal.say(f"{title:22}{what}", hang=22)
-    if path is not None:
-        terminal.say(f"{'picture':22}{path}", hang=22)
+    rows = *_board_lines(skin, args.cells, found), *_host_lines(board.title, found, args.exact)
+    drawn = [] if path is None else [("picture", str(path))]
+    results.show(args, found.as_json(), lambda: results.table(*rows, *drawn))
     return 0
 
 

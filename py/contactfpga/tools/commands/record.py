@@ -12,13 +12,14 @@ from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
-from contactfpga.tools.console import flags, interrupt, numbers
+from contactfpga.tools.console import flags, interrupt, numbers, results
 from contactfpga.tools.console.forces import Forces
 
 if TYPE_CHECKING:
     from contactfpga.robot.body import Body
     from contactfpga.robot.body.plan import Plan
     from contactfpga.robot.ros.feed import Felt
+    from contactfpga.tools.recordings.recover import RecoveryReport
     from contactfpga.tools.recordings.session import Session
 
 EXTRA = "record"
@@ -42,6 +43,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bytes-only", action="store_true", help=bare)
     recover = "Record nothing; repair a recording whose program was killed or whose disk was full."
     parser.add_argument("--recover", action="store_true", help=recover)
+    flags.json(parser, "Print one JSON object at the end: files, frames and bytes; with --recover what is left out.")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,7 +62,7 @@ def _record(args: argparse.Namespace) -> int:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
     about = {} if body is None else {packed.ROBOT: packed.pack(args.port)}
     session = Session(args.file, split, args.bytes_only, about=about)
-    progress = _Progress(session)
+    progress = _Progress(session, args)
     try:
         with session:
             _add(session, args, body)
@@ -115,13 +117,27 @@ def _recover(args: argparse.Namespace) -> int:
         if getattr(args, name) not in (None, False):
             raise ContactFPGAError(f"--{name.replace('_', '-')} is for a recording that is made; --recover repairs one")
     found = recover(args.file, args.port)
+    answer = {
+        "file": found.path,
+        "messages": found.messages,
+        "duration_s": found.seconds,
+        "recordings": found.recordings,
+        "usable": found.usable,
+        "cut_bytes": found.cut,
+        "damaged_pieces": found.damaged,
+        "omitted": found.omitted,
+        "beyond_bytes": found.beyond,
+    }
+    results.show(args, answer, lambda: _show_recovered(args.file, found))
+    return 0
+
+
+def _show_recovered(file: str, found: RecoveryReport) -> None:
     terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
     if found.recordings > 1:
-        terminal.say(
-            f"{args.file} holds {found.recordings} recordings, one after the other; the new file has them all."
-        )
+        terminal.say(f"{file} holds {found.recordings} recordings, one after the other; the new file has them all.")
     elif found.usable:
-        terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
+        terminal.say(f"Nothing is missing: {file} was closed and whole, so you can use it as it is.")
     if found.cut:
         terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
     if found.damaged:
@@ -130,7 +146,6 @@ def _recover(args: argparse.Namespace) -> int:
         terminal.say(f"Left out: {count:,} {what}.")
     if found.beyond:
         terminal.say(f"Left out after the end: {found.beyond:,} bytes that are no recording.")
-    return 0
 
 
 def _pieces(count: int) -> str:
@@ -138,8 +153,8 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, args: argparse.Namespace) -> None:
+        self._session, self._args = session, args
         self._live = terminal.of(sys.stderr).live
         self._due_s = time.monotonic() + SHOWN_S
         self._shown = False
@@ -155,7 +170,18 @@ class _Progress:
             print("\r", end="\033[K", file=sys.stderr, flush=True)
         session = self._session
         if session.links:
-            terminal.say(f"{', '.join(map(str, session.files))}: {self._line()}")
+            answer = {
+                "files": session.files,
+                "duration_s": session.seconds,
+                "frames": session.frames,
+                "bytes": session.size,
+                "links": [
+                    {"name": one.name, "error": one.error and str(one.error), "notes": one.notes}
+                    for one in session.links
+                ],
+            }
+            files = ", ".join(map(str, session.files))
+            results.show(self._args, answer, lambda: terminal.say(f"{files}: {self._line()}"))
         for link in session.links:
             lost = [f"{link.name}: {link.error}"] if link.error is not None and len(session.links) > 1 else []
             for note in link.notes + lost:

@@ -8,7 +8,7 @@ import time
 
 from contactfpga import terminal
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = "sim"
 
@@ -26,7 +26,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
     ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."
     parser.add_argument("--closed", action="store_true", help=ends)
-    parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
+    flags.json(parser, flags.FRAMES)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,12 +46,11 @@ def run(args: argparse.Namespace) -> int:
         late.append(result.last_record or 0)
     seconds = time.monotonic() - started
     closed = ", ends meet" if skin.closed else ""
-    for title, what in (
+    results.table(
         ("frames", f"{len(frames)} of {skin.rows}x{skin.columns}, {skin.connectivity}-connectivity{closed}"),
         ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
         ("last record", f"at most {max(late)} clocks after a frame's last row"),
         ("speed", f"{len(frames) / seconds:,.0f} frames per second, once compiled"),
-    ):
-        terminal.say(f"{title:20}{what}", hang=20)
+    )
     terminal.say("Every frame came back exactly once. Use --json for one JSON object per frame.")
     return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from typing import Any
 
 from contactfpga import helptext, terminal
@@ -15,7 +14,7 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.design.circuit.values import LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
@@ -46,7 +45,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         diode.add_argument(_flag(f"diode_{one.name}"), type=kind, metavar=spice, help=words)
     factor = f"Recommended times are this many times those computed (default: {MARGIN:g})."
     parser.add_argument("--margin", type=numbers.number(1, 10), default=MARGIN, metavar="FACTOR", help=factor)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flags.json(parser)
 
 
 def _meanings(kind: type) -> dict[str, str]:
@@ -76,10 +75,7 @@ def run(args: argparse.Namespace) -> int:
     answer = _answer(values, needs, problems, args.margin) | asked
     if args.skin:
         answer["skin"] = _given(skin, sheet.recommended_us(skin, needs, args.margin))
-    if args.json:
-        print(json.dumps(answer, allow_nan=False))
-    else:
-        _show(answer, needs, args.margin)
+    results.show(args, answer, lambda: _show(answer, needs, args.margin))
     short = any(not one["enough"] for one in answer.get("skin", {}).values())
     return UNSOLVED if problems or short or None in answer.values() else 0
 
@@ -120,8 +116,8 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
             "row_peak": round(needs.row_peak_ma, 4),
             "column_peak": round(needs.column_peak_ma, 4),
         },
-        "problems": [dataclasses.asdict(problem) for problem in problems],
-        "circuit": dataclasses.asdict(circuit),
+        "problems": problems,
+        "circuit": circuit,
     }
 
 

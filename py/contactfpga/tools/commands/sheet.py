@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import collections
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from contactfpga.design.sheet.layout import MARGIN_MM
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = None
 
@@ -40,7 +39,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--kicad", action="store_true", help="Have KiCad 6 check the board; status 1 if it finds anything."
     )
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flags.json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,10 +78,7 @@ def run(args: argparse.Namespace) -> int:
         "extracted": {name: value for name, value in dataclasses.asdict(found).items() if name != "circuit"},
         "kicad": problems,
     }
-    if args.json:
-        print(json.dumps(answer))
-    else:
-        _show(answer, skin)
+    results.show(args, answer, lambda: _show(answer, skin))
     return 1 if problems else 0
 
 

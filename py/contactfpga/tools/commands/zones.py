@@ -23,7 +23,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.connection(parser)
     flags.once(parser)
     flags.seconds(parser)
-    parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
+    flags.json(parser, flags.FRAMES)
     parser.add_argument(
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
     )

@@ -134,6 +134,15 @@ def known_skin(board: Board) -> Skin | None:
         return None
 
 
+SI = "Print one JSON object in SI units."
+FRAMES = "Print every frame as a line with one JSON object."
+
+
+def json(parser: argparse.ArgumentParser, text: str = "Print one JSON object.") -> None:
+    """Add the flag of :func:`contactfpga.tools.console.results.show`."""
+    parser.add_argument("--json", action="store_true", help=text)
+
+
 def workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
     dask = "Send the work to the Dask cluster with this scheduler."

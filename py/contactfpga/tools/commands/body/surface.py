@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from contactfpga import terminal
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.skin import Skin
 from contactfpga.surfaces.laying import Placement, Triangles
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = "surface"
 
@@ -32,6 +33,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rpy", nargs=3, type=numbers.TURN, default=(0, 0, 0), metavar=("R", "P", "Y"), help=rpy)
     scale = "Millimeters per unit of the mesh (default: 1; 1000 for a mesh in meters)."
     parser.add_argument("--scale", type=numbers.number(1e-6, 1e6, "mm"), default=1.0, metavar="MM", help=scale)
+    flags.json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,11 +48,22 @@ def run(args: argparse.Namespace) -> int:
     )
     table = laid.unrolled(triangles, closed=skin.closed) if args.by == "unrolling" else laid.projected(triangles)
     table.save(output)
-    (x_low, x_high), (y_low, y_high) = table.spacing_mm
-    terminal.say(f"{output}: {skin.rows}x{skin.columns} cells on {len(triangles.corners_mm)} triangles")
+    answer = {
+        "file": output,
+        "rows": skin.rows,
+        "columns": skin.columns,
+        "triangles": len(triangles.corners_mm),
+        "spacing_mm": table.spacing_mm,
+    }
+    results.show(args, answer, lambda: _show(answer, skin))
+    return 0
+
+
+def _show(answer: dict[str, Any], skin: Skin) -> None:
+    (x_low, x_high), (y_low, y_high) = answer["spacing_mm"]
+    terminal.say(f"{answer['file']}: {skin.rows}x{skin.columns} cells on {answer['triangles']} triangles")
     terminal.say(
         f"neighbors lie {x_low:.2f} to {x_high:.2f} mm apart along rows (pitch {skin.pitch_x_mm:g}), {y_low:.2f} to "
         f"{y_high:.2f} along columns (pitch {skin.pitch_y_mm:g})",
         hang=2,
     )
-    return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import datetime
-import json
 import math
 import re
 import statistics
@@ -31,7 +30,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
 from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
 from contactfpga.tools.commands.bringup.report import BringUpReport, graded
-from contactfpga.tools.console import flags, interrupt, numbers, outputs
+from contactfpga.tools.console import flags, interrupt, numbers, outputs, results
 
 EXTRA = None
 
@@ -63,7 +62,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="Do not wait for Enter before each step.")
     yours = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
     parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=yours)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object at the end, and nothing before it.")
+    flags.json(parser, "Print one JSON object at the end, and nothing before it.")
 
 
 def _measured(text: str) -> tuple[str, float]:
@@ -93,10 +92,7 @@ def run(args: argparse.Namespace) -> int:
     report.grades = graded(predicted, measured)
     report.not_measured = [one for name, one in predicted.items() if name not in measured]
     write_text(path, report.to_markdown())
-    if args.json:
-        print(json.dumps(report.to_dict()), flush=True)
-    else:
-        _show_end(report, str(path))
+    results.show(args, report, lambda: _show_end(report, str(path)))
     return min(report.faults, 1)
 
 

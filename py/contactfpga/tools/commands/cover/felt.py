@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 
 from contactfpga.design import kits
 from contactfpga.design.cover import felt as touches
@@ -13,8 +12,8 @@ from contactfpga.design.cover.press import Cover, load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import MM, say, table
-from contactfpga.tools.console import flags, numbers
+from contactfpga.tools.commands.cover import MM
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
@@ -40,7 +39,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     seed = "Of the closing forces that are drawn where the switch has a spread (default: 0)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**32 - 1), default=0, metavar="N", help=seed)
-    cover.json_flag(parser)
+    flags.json(parser, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,12 +57,8 @@ def run(args: argparse.Namespace) -> int:
         *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed)
     )
     unsolved = any(isinstance(force, NoSolution) for force in (found.half, found.most, found.worst))
-    if args.json:
-        finger = {"length_m": args.length, "width_m": args.width}
-        names = (field.name for field in dataclasses.fields(Felt))
-        say({"finger": finger} | {name: getattr(found, name) for name in names})
-    else:
-        _print(found, laid, args)
+    answer = {"finger": {"length_m": args.length, "width_m": args.width}} | vars(found)
+    results.show(args, answer, lambda: _print(found, laid, args))
     return UNSOLVED if unsolved else 0
 
 
@@ -77,7 +72,7 @@ def _print(found: Felt, laid: Cover, args: argparse.Namespace) -> None:
     forces = f"{laid.switch.force_n:g} N"
     if found.sheets > 1:
         forces += f", {100 * laid.switch.spread:g} % spread; 95 % of {found.sheets} drawn sheets in parentheses"
-    table(
+    results.table(
         ("finger", f"{size}, at {found.places} places and angles"),
         ("a switch closes at", forces),
         ("50 % of touches felt from", _force(found.half)),

@@ -10,8 +10,10 @@ from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import METHODS, Impact
+from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import KPA, MM, notes, say, table, unsolved
+from contactfpga.tools.commands.cover import KPA, MM, notes
+from contactfpga.tools.console import flags, results
 
 EXTRA = "sim"
 
@@ -47,7 +49,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     foam.add_argument("--yield-strength", type=cover.PASCAL, metavar="PA", help=strength)
     method = "How the equation of motion is solved (default: auto)."
     parser.add_argument("--solver", choices=METHODS, default="auto", help=method)
-    cover.json_flag(parser)
+    flags.json(parser, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,7 +66,8 @@ def run(args: argparse.Namespace) -> int:
     )
     answer = _struck(args, arm)
     if isinstance(answer, NoSolution):
-        return unsolved(answer, args.json)
+        results.show(args, answer, lambda: print(answer))
+        return UNSOLVED
     ball = elastic.ball_of(answer.stiffness, args.effective_radius)
     known: dict[str, Any] = {
         "compression_m": answer.compression_m,
@@ -80,20 +83,23 @@ def run(args: argparse.Namespace) -> int:
         "method": answer.method,
         "notes": [*answer.notes, *_hertz_notes(args.thickness, ball, answer.force_n)],
     }
-    if args.json:
-        return say(known)
-    table(
-        ("compression", f"{MM * answer.compression_m:.4g} mm"),
-        ("compression time", f"{MM * answer.time_s:.5g} ms"),
-        ("peak force", f"{answer.force_n:.4g} N"),
+    results.show(args, known, lambda: _show(known))
+    return 0
+
+
+def _show(known: dict[str, Any]) -> None:
+    results.table(
+        ("compression", f"{MM * known['compression_m']:.4g} mm"),
+        ("compression time", f"{MM * known['time_s']:.5g} ms"),
+        ("peak force", f"{known['force_n']:.4g} N"),
         ("radius of the patch then", f"{MM * known['patch_m']:.4g} mm"),
-        ("stiffness K_s", f"{answer.stiffness:.6g} N/m^1.5"),
+        ("stiffness K_s", f"{known['stiffness']:.6g} N/m^1.5"),
         ("Young's modulus", f"{KPA * known['modulus_pa']:.5g} kPa"),
-        ("effective modulus E*", f"{KPA * ball.modulus_pa:.5g} kPa"),
-        ("inertia", f"{arm.inertia_kgm2:.6g} kg m2"),
-        ("method", answer.method),
+        ("effective modulus E*", f"{KPA * known['effective_modulus_pa']:.5g} kPa"),
+        ("inertia", f"{known['inertia_kgm2']:.6g} kg m2"),
+        ("method", known["method"]),
     )
-    return notes(known["notes"])
+    notes(known["notes"])
 
 
 def _struck(args: argparse.Namespace, arm: Arm) -> Impact | NoSolution:

@@ -12,7 +12,8 @@ from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, PaddedSheet, Sense
 from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import MM, notes, say, table
+from contactfpga.tools.commands.cover import MM, notes
+from contactfpga.tools.console import flags, results
 
 EXTRA = "sim"
 
@@ -41,7 +42,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     model.add_argument("--contact", choices=("point", "patch"), help="Contact of --model (default: point).")
     share = "Largest share by which the answer may be off (default: 0.05); refuse --model beyond it."
     model.add_argument("--tolerance", type=cover.SHARE, help=share)
-    cover.json_flag(parser)
+    flags.json(parser, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -81,19 +82,22 @@ def run(args: argparse.Namespace) -> int:
         "contact": last.model.contact,
         "reference": str(sheet.reference),
         "error": last.error,
-        "dropped": list(last.dropped),
+        "dropped": last.dropped,
         "notes": list(dict.fromkeys(note for one in judged for note in one.notes)),
     }
     unsolved = any(isinstance(one.value, NoSolution) for one in judged)
-    if args.json:
-        return say(found) or (UNSOLVED if unsolved else 0)
     lines.append(("model", str(last.model)))
     if last.error is not None and last.model != sheet.reference:
         lines.append(("off from the reference by", f"{100 * last.error:+.1f} % ({sheet.reference})"))
     if last.dropped:
         lines.append(("left out", ", ".join(last.dropped)))
-    table(*lines)
-    return notes(found["notes"]) or (UNSOLVED if unsolved else 0)
+    results.show(args, found, lambda: _show(lines, found["notes"]))
+    return UNSOLVED if unsolved else 0
+
+
+def _show(lines: list[tuple[str, str]], said: list[str]) -> None:
+    results.table(*lines)
+    notes(said)
 
 
 def _answer(
@@ -120,13 +124,12 @@ def _best_thickness(args: argparse.Namespace, switch: Switch) -> int:
     thickness = sense.best_thickness_m(offset, within)
     force = PaddedSheet(switch, thickness).force_n(Model(within, "point"), offset)
     known = {"thickness_m": thickness, "force_n": force, "offset_m": offset, "model": within, "contact": "point"}
-    if args.json:
-        return say(known)
-    table(
+    lines = [
         (f"best thickness, {MM * offset:.4g} mm from a switch", f"{MM * thickness:.5g} mm"),
         ("force that closes it", f"{force:.5g} N"),
         ("model", f"{within}, point"),
-    )
+    ]
+    results.show(args, known, lambda: results.table(*lines))
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
 from contactfpga.robot.haptics.rate import Rating, Requirements, UnitLayout, compared, draw, rate
 from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = "haptics"
 
@@ -47,7 +46,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="Print every arrangement, not only the best of each kind.")
     parser.add_argument("--picture", metavar="FILE", help="Draw the best one into this .svg or .png (extra sim).")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
+    flags.json(parser, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,10 +57,8 @@ def run(args: argparse.Namespace) -> int:
     ratings = compared(needs, args.ring or ring)
     if args.units:
         ratings = sorted([*ratings, _own(needs, args.units)], key=lambda rating: rating.place_m)
-    if args.json:
-        print(json.dumps({"layouts": [_answer(rating) for rating in ratings]}, allow_nan=False))
-    else:
-        _show(needs, ratings if args.all else _best(ratings))
+    answer = {"layouts": [_answer(rating) for rating in ratings]}
+    results.show(args, answer, lambda: _show(needs, ratings if args.all else _best(ratings)))
     if picture is not None:
         draw(picture, needs, ratings)
     return 0

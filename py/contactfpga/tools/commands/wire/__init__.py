@@ -21,7 +21,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--settle", action="store_true", help=settles)
     seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object with what was measured.")
+    flags.json(parser, "Print one JSON object with what was measured.")
 
 
 def run(args: argparse.Namespace) -> int:
