@@ -160,7 +160,7 @@ def _show(answer: dict[str, Any], needs: Needs, margin: float) -> None:
         what = "enough" if one["enough"] else f"too short, {_or_never(one['needed'])} needed"
         terminal.say(f"the Skin's {name} = {one['given']:g}: {what}")
     for problem in answer["problems"]:
-        terminal.say(f"cannot work: {problem['what']}; {problem['helps']}", hang=2)
+        terminal.say(f"cannot work: {problem.what}; {problem.helps}", hang=2)
 
 
 def _or_never(us: float | None) -> str:
