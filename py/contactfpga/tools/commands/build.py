@@ -26,16 +26,14 @@ EXTRA = "boards"
 BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec."
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
-    flags.design(parser, "Skin to build (default: one that fits the board).")
-    flags.output(parser, "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit).", "DIR")
-    start = "Seed of place and route (default: 1)."
-    parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
-    check = "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would."
-    parser.add_argument("--check", action="store_true", help=check)
-    parser.add_argument("--wiring", action="store_true", help="Only print the wiring table; build nothing.")
-    flags.json(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flag("[BOARD]", f"{BOARD} With --kit it is the kit's.")
+    flags.design(flag, "Skin to build (default: one that fits the board).")
+    flags.output(flag, "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit).", "DIR")
+    flag("--seed N", "Seed of place and route.", numbers.whole(0, 2**31 - 1), 1)
+    flag("--check", "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would.")
+    flag("--wiring", "Only print the wiring table; build nothing.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

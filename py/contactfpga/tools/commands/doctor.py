@@ -37,18 +37,17 @@ ZONES_ONLY = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
     long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
-    watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
-    parser.add_argument("--watch", action="store_true", help=watch)
+    flag("--seconds S", long, numbers.SECONDS)
+    flag("--watch", "Follow the board while you touch every switch; name those that are stuck, loose or dead.")
     tested = "Have the board drive each line alone, again and again while you press every place; name joined lines."
-    parser.add_argument("--self-test", action="store_true", help=tested)
+    flag("--self-test", tested)
     stuck = "Seconds without a change after which --watch reports a pressed switch (default: 10)."
-    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="S", help=stuck)
-    parser.add_argument("--list", action="store_true", help="Listen to all ports; list the boards and their names.")
-    flags.json(parser, "Print one JSON object: findings and counters.")
+    flag("--stuck-s S", stuck, numbers.SECONDS)
+    flag("--list", "Listen to all ports; list the boards and their names.")
+    flags.json(flag, "Print one JSON object: findings and counters.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,10 +12,10 @@ from contactfpga.tools.console import flags, outputs, results
 EXTRA = "analysis"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", metavar="RECORDING.mcap", help="What `contactfpga record` wrote.")
-    parser.add_argument("table", metavar="OUT", help="The table: OUT.parquet, OUT.npz or OUT.csv.")
-    flags.json(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flag("RECORDING.mcap", "What `contactfpga record` wrote.")
+    flag("OUT", "The table: OUT.parquet, OUT.npz or OUT.csv.", dest="table")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

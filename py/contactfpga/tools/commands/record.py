@@ -27,23 +27,20 @@ EXTRA = "record"
 SHOWN_S = 0.5
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    file = "File to write; it must not exist yet. With --recover: the file to repair; it is not changed."
-    parser.add_argument("file", metavar="FILE.mcap", help=file)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.mcap", "File to write; it must not exist yet. With --recover: the file to repair; it is not changed.")
     robot = "or ROBOT.toml for all boards of a robot (docs/body.md)."
     into = "With --recover: the new file (default: FILE_recovered.mcap)."
-    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, {robot} {into}")
-    flags.seconds(parser)
+    flags.connection(flag, f"{flags.PORT.removesuffix('.')}, {robot} {into}")
+    flags.seconds(flag)
     megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
-    parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
-    seconds = "The same, each this many seconds long."
-    parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
-    flags.forces(parser, "Add forces")
+    flag("--split-mb MB", megabytes, numbers.number(0.1, 1e6, "MB"))
+    flag("--split-s S", "The same, each this many seconds long.", numbers.number(1, 86_400, "s"))
+    flags.forces(flag, "Add forces")
     bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."
-    parser.add_argument("--bytes-only", action="store_true", help=bare)
-    recover = "Record nothing; repair a recording whose program was killed or whose disk was full."
-    parser.add_argument("--recover", action="store_true", help=recover)
-    flags.json(parser, "Print one JSON object at the end: files, frames and bytes; with --recover what is left out.")
+    flag("--bytes-only", bare)
+    flag("--recover", "Record nothing; repair a recording whose program was killed or whose disk was full.")
+    flags.json(flag, "Print one JSON object at the end: files, frames and bytes; with --recover what is left out.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -13,20 +13,16 @@ from contactfpga.tools.console import flags, numbers, results
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("frames", metavar="FRAMES.npy", help="Array (frames, rows, columns) of bool or numbers.")
-    joined = "Neighbors of a cell: 8 with corners, 4 without (default: 8)."
-    parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help=joined)
-    above = "Count cells above this as pressed; needed for numbers."
-    parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
-    pitch = "Distance between rows and between columns in mm (default: 10)."
-    parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, metavar="MM", help=pitch)
-    bits = numbers.whole(*Skin.limits("barycenter_bits"))
+def add_flags(flag: flags.Flags) -> None:
+    flag("FRAMES.npy", "Array (frames, rows, columns) of bool or numbers.")
+    flag("--connectivity", "Neighbors of a cell: 8 with corners, 4 without.", (4, 8), 8)
+    flag("--threshold X", "Count cells above this as pressed; needed for numbers.", numbers.CELL)
+    flag("--pitch-mm MM", "Distance between rows and between columns in mm.", numbers.PITCH_MM, 10.0)
     divided = "Divide barycenters on the board, to 1/2^K cell (default: the host divides)."
-    parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
+    flag("--barycenter-bits K", divided, numbers.whole(*Skin.limits("barycenter_bits")))
     ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."
-    parser.add_argument("--closed", action="store_true", help=ends)
-    flags.json(parser, flags.FRAMES)
+    flag("--closed", ends)
+    flags.json(flag, flags.FRAMES)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,12 +12,12 @@ from contactfpga.tools.console import flags, outputs, results
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.sheet(parser, "Skin of the board (default: the reference Skin).")
+def add_flags(flag: flags.Flags) -> None:
+    flags.sheet(flag, "Skin of the board (default: the reference Skin).")
     pressed = "Press the first frame of this array of (frames, rows, columns) (default: 2x2 cells in the middle)."
-    parser.add_argument("--pressed", metavar="FRAMES.npy", help=pressed)
-    flags.output(parser, "File to write (default: touch.vcd).", default="touch.vcd")
-    flags.json(parser)
+    flag("--pressed FRAMES.npy", pressed)
+    flags.output(flag, "File to write (default: touch.vcd).", default="touch.vcd")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

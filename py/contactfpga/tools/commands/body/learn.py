@@ -23,16 +23,15 @@ EXTRA = None
 MAX_LINE = 200
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
-    parser.add_argument("link", metavar="LINK", help="Name of the link whose sheet folds.")
-    parser.add_argument("joint", metavar="JOINT", help="Name of the joint that folds it.")
-    output = "File to write; robot.toml names it as the link's folds."
-    parser.add_argument("output", metavar="FOLDS.json", help=output)
-    step = f"Width of a step of the angle; folds are learned per step (default: {folds.STEP_RAD:g})."
-    parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
-    flags.json(parser)
-    parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
+    flag("LINK", "Name of the link whose sheet folds.")
+    flag("JOINT", "Name of the joint that folds it.")
+    flag("FOLDS.json", "File to write; robot.toml names it as the link's folds.", dest="output")
+    step = "Width of a step of the angle; folds are learned per step."
+    flag("--step RAD", step, numbers.number(1e-4, 1, "rad"), folds.STEP_RAD)
+    flags.json(flag)
+    flag.parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,14 +19,13 @@ from contactfpga.tools.console import flags, numbers, results
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
-    parser.add_argument("link", metavar="LINK", help="Name of the link.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
+    flag("LINK", "Name of the link.")
     points = "Known points on the link, a [[point]] with point_m each; you press those without pressed_mm when asked."
-    parser.add_argument("points", metavar="POINTS.toml", help=points)
-    wait = "Seconds to wait for each press (default: 60)."
-    parser.add_argument("--wait", type=numbers.SECONDS, default=60.0, metavar="S", help=wait)
-    flags.json(parser)
+    flag("POINTS.toml", points)
+    flag("--wait S", "Seconds to wait for each press.", numbers.SECONDS, 60.0)
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

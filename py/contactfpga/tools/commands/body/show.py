@@ -19,17 +19,15 @@ READINGS_S = 0.03
 """Delay of a frame's pressure unit readings."""
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
     frame = "Frame of the contacts: base, or link for each link's own (default: base, or link without a URDF)."
-    parser.add_argument("--frame", choices=(BASE, LINK), help=frame)
+    flag("--frame", frame, (BASE, LINK))
     joint = "Angle of a joint in rad, or m of one that slides; may be repeated (default: 0)."
-    parser.add_argument("--joint", action="append", default=[], type=angle, metavar="NAME=RAD", help=joint)
-    seconds = "Print the state every second, for this long (default: once)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
-    flags.json(parser, "Print a line with one JSON object each time.")
-    wait = "Seconds to wait for each board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+    flag("--joint NAME=RAD ...", joint, angle, [])
+    flag("--seconds S", "Print the state every second, for this long (default: once).", numbers.SECONDS)
+    flags.json(flag, "Print a line with one JSON object each time.")
+    flag("--timeout S", "Seconds to wait for each board.", numbers.SECONDS, 1.0)
 
 
 def angle(text: str) -> tuple[str, float]:

@@ -46,23 +46,20 @@ REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
 """Simulated times in s: longest constant action of the hand, and counting."""
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    port = (
-        "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
-    )
-    parser.add_argument("port", nargs="?", metavar="PORT", help=port)
-    flags.kit(parser)
+def add_flags(flag: flags.Flags) -> None:
+    port = "As for other commands; sim:// rehearses on a virtual board"
+    flag("[PORT]", f"{port} (default: the supported board that is plugged in).")
+    flags.kit(flag)
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
-    parser.add_argument("--skin-output", metavar="FILE", help=own)
-    flags.output(parser, "The report (default: bringup-NAME-DATE.md).")
+    flag("--skin-output FILE", own)
+    flags.output(flag, "The report (default: bringup-NAME-DATE.md).")
     long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
-    wait = "Seconds to wait for the board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
-    parser.add_argument("--yes", action="store_true", help="Do not wait for Enter before each step.")
+    flag("--seconds S", long, numbers.SECONDS)
+    flag("--timeout S", "Seconds to wait for the board.", numbers.SECONDS, 1.0)
+    flag("--yes", "Do not wait for Enter before each step.")
     yours = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
-    parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=yours)
-    flags.json(parser, "Print one JSON object at the end, and nothing before it.")
+    flag("--measured NAME=VALUE ...", yours, _measured, [])
+    flags.json(flag, "Print one JSON object at the end, and nothing before it.")
 
 
 def _measured(text: str) -> tuple[str, float]:

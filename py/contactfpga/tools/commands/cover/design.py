@@ -39,9 +39,9 @@ THIN_HEADS = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.toml", help="Arm, impact, switch and limits; see examples/.")
-    flags.json(parser, flags.SI)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.toml", "Arm, impact, switch and limits; see examples/.")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:

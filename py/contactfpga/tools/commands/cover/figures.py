@@ -15,13 +15,12 @@ from contactfpga.tools.console import flags, outputs, results
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--case", metavar="CASE", help="Case to draw: a .toml file (default: the paper's).")
-    data = "Forces in N and deformations in m; draw their line too."
-    parser.add_argument("--data", metavar="FILE.csv", help=data)
-    flags.output_folder(parser, "build/cover")
-    parser.add_argument("--format", choices=("png", "svg"), default="png", help="Format (default: png).")
-    flags.json(parser, "Print in JSON what was drawn.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("--case CASE", "Case to draw: a .toml file (default: the paper's).")
+    flag("--data FILE.csv", "Forces in N and deformations in m; draw their line too.")
+    flags.output_folder(flag, "build/cover")
+    flag("--format", "Format.", ("png", "svg"), "png")
+    flags.json(flag, "Print in JSON what was drawn.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -13,13 +13,10 @@ from contactfpga.tools.console import flags, results
 EXTRA = "haptics"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "file", metavar="FILE.json", help="The wrench, with contacts or a surface; docs/haptics.md has the format."
-    )
-    cones = "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices."
-    parser.add_argument("--cones", action="store_true", help=cones)
-    flags.json(parser, flags.SI)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.json", "The wrench, with contacts or a surface; docs/haptics.md has the format.")
+    flag("--cones", "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices.")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -16,15 +16,14 @@ from contactfpga.wire.units import UnitFacts
 EXTRA = "haptics"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
     unit = "Unit K raises contact from this deviation on, either way; 0: never. May be given again for other units."
-    parser.add_argument("--unit", action="append", default=[], metavar="K=STEPS", help=unit)
-    whole = "Sum K, a row of the Skin's unit_sums, likewise."
-    parser.add_argument("--sum", action="append", default=[], metavar="K=STEPS", help=whole)
+    flag("--unit K=STEPS ...", unit, default=[])
+    flag("--sum K=STEPS ...", "Sum K, a row of the Skin's unit_sums, likewise.", default=[])
     units = "The units (docs/haptics.md): then --unit takes newtons, as 0=8, and so does --sum if all gains are equal."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    flags.json(parser)
+    flag("--units FILE", units)
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,9 +12,9 @@ from contactfpga.tools.console import flags, results
 EXTRA = "haptics"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.json", help="Units and readings; docs/haptics.md has the format.")
-    flags.json(parser, flags.SI)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.json", "Units and readings; docs/haptics.md has the format.")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:

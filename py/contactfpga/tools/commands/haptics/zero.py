@@ -21,14 +21,12 @@ EXTRA = "haptics"
 LEAST = 10
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
-    long = "Seconds of the board's time over which readings are averaged (default: 0.1)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, default=0.1, metavar="S", help=long)
-    units = "The units (docs/haptics.md): refuse readings that are noisier than this file states."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    flags.output(parser, "Write the units with their new zeros to this TOML file.")
-    flags.json(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
+    flag("--seconds S", "Seconds of the board's time over which readings are averaged.", numbers.SECONDS, 0.1)
+    flag("--units FILE", "The units (docs/haptics.md): refuse readings that are noisier than this file states.")
+    flags.output(flag, "Write the units with their new zeros to this TOML file.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -22,26 +22,21 @@ EXTRA = "sim"
 PLACES = 60
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
-    parser.add_argument("--case", default="paper", metavar="CASE", help=case)
-    late, usual = numbers.number(0, 1e7, "us"), "Latency from the switch to the controller (default: the paper's 6000)."
-    parser.add_argument("--latency-us", type=late, default=6000.0, metavar="US", help=usual)
-    many, places = (
-        numbers.whole(0, 10_000),
-        "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place).",
-    )
-    parser.add_argument("--places", type=many, metavar="N", help=places)
-    parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
-    flags.json(parser, "Print one JSON object in SI units, and draw nothing.")
-    charts = "Draw force and thickness against latency instead."
-    parser.add_argument("--charts", action="store_true", help=charts)
+def add_flags(flag: flags.Flags) -> None:
+    flag("--case CASE", "Case to run: paper, paper-offset, push or a .toml file.", default="paper")
+    usual = "Latency from the switch to the controller (default: the paper's 6000)."
+    flag("--latency-us US", usual, numbers.number(0, 1e7, "us"), 6000.0)
+    places = "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place)."
+    flag("--places N", places, numbers.whole(0, 10_000))
+    flag("--skin FILE", "Skin of the sheet (default: the reference Skin).")
+    flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
+    flag("--charts", "Draw force and thickness against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
-    parser.add_argument("--regions", metavar="FILE.toml", help=regions)
+    flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
-    parser.add_argument("--force-threshold", action="store_true", help=force)
-    flags.workers(parser)
-    flags.output_folder(parser, "build/arm")
+    flag("--force-threshold", force)
+    flags.workers(flag)
+    flags.output_folder(flag, "build/arm")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
-    flags.output_folder(parser, "build/failures")
+def add_flags(flag: flags.Flags) -> None:
+    flag("--study NAME ...", "Run only this study; can be repeated.")
+    flags.output_folder(flag, "build/failures")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,19 +11,16 @@ from contactfpga.tools.console.interrupt import Interruption
 EXTRA = "chart"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--design", action="append", metavar="NAME", help="Flip only this design; can be repeated.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("--design NAME ...", "Flip only this design; can be repeated.")
     count = numbers.whole(1, 1_000_000)
-    registers = "Flips of flip-flops per design (default: 400); always the same ones."
-    parser.add_argument("--registers", type=count, default=400, metavar="N", help=registers)
-    memories = "Flips of memory bits per design (default: 100)."
-    parser.add_argument("--memories", type=count, default=100, metavar="N", help=memories)
+    flag("--registers N", "Flips of flip-flops per design (default: 400); always the same ones.", count, 400)
+    flag("--memories N", "Flips of memory bits per design.", count, 100)
     minutes = "Begin no more flips after this time, and take those that were followed until then."
-    parser.add_argument("--minutes", type=numbers.number(0.1, 10_000, "minutes"), metavar="N", help=minutes)
-    only = "Run nothing: use the results kept from earlier runs, as many as there are for each design."
-    parser.add_argument("--kept", action="store_true", help=only)
-    flags.workers(parser)
-    flags.output_folder(parser, "build/flips")
+    flag("--minutes N", minutes, numbers.number(0.1, 10_000, "minutes"))
+    flag("--kept", "Run nothing: use the results kept from earlier runs, as many as there are for each design.")
+    flags.workers(flag)
+    flags.output_folder(flag, "build/flips")
 
 
 def run(args: argparse.Namespace) -> int:
