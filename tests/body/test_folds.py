@@ -98,7 +98,7 @@ def test_folds_are_of_cells(robot):
 
 def test_command_learns_from_angles_on_standard_input(robot, capsys, monkeypatch):
     monkeypatch.setattr("contactfpga.driver.driver.open", lambda *_, **__: contactfpga.Board(Sweeping(), SKIN))
-    robot.write_text(ROBOT)
+    robot.write_text(ROBOT + "late_s = 60.0\nsilent_s = 90.0\n")  # on a busy machine as well
     output = robot.parent / "new.json"
     asked = ["body", "learn", str(robot), "arm", "elbow", str(output), "--step", "0.1"]
     monkeypatch.setattr("sys.stdin", io.StringIO("0.05\n0.15\n\n0.35\n"))
@@ -107,6 +107,12 @@ def test_command_learns_from_angles_on_standard_input(robot, capsys, monkeypatch
     assert "new.json: 3 frames from 0.00 to 0.40 rad, 12 cells pressed somewhere, at 3 of 3 steps" in printed
     assert "no frame came at 1 of the 2 steps between: move more slowly, or folds there are not marked" in printed
     assert Folds.load(output).frames == {0: 1, 1: 1, 3: 1}
+    monkeypatch.setattr("sys.stdin", io.StringIO("0.05\n0.15\n\n0.35\n"))
+    assert cli.main([*asked, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["file"], answer["frames"], answer["from_rad"]) == (str(output), 3, 0)
+    assert answer["to_rad"] == pytest.approx(0.4)
+    assert [answer[name] for name in ("cells", "steps", "steps_pressed", "steps_missed")] == [12, 3, 3, 1]
     for text, says in (
         ("x\n", "line 1 of standard input is 'x'; it must be an angle in rad"),
         ("", "no angle came on standard"),

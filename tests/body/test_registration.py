@@ -132,8 +132,8 @@ def test_command_waits_for_presses_and_prints_lines_for_the_table(tmp_path, caps
     (tmp_path / "robot.toml").write_text('[[links]]\nname = "arm"\nskin = "round.toml"\nport = "a"\n')
     points = [truth(ROUND, pose, True, x, y)[0].tolist() for x, y in places]
     (tmp_path / "points.toml").write_text("".join(f"[[point]]\npoint_m = {point}\n" for point in points))
-    board = contactfpga.open(Pressing(ROUND, places), ROUND)
-    monkeypatch.setattr("contactfpga.driver.driver.open", lambda port, skin: board)
+    boards = [contactfpga.open(Pressing(ROUND, places), ROUND) for _ in range(2)]
+    monkeypatch.setattr("contactfpga.driver.driver.open", lambda port, skin: boards.pop())
     asked = ["body", "register", str(tmp_path / "robot.toml"), "arm", str(tmp_path / "points.toml")]
     assert cli.main([*asked]) == 0
     printed = capsys.readouterr().out
@@ -141,6 +141,10 @@ def test_command_waits_for_presses_and_prints_lines_for_the_table(tmp_path, caps
     assert "point_m = [0.1, " in printed
     assert "mirrored = true\n" in printed
     assert "against robot.toml it is mirrored and turned by 180.0 degrees" in printed
+    assert cli.main([*asked, "--json"]) == 0
+    printed, asks = capsys.readouterr()
+    assert json.loads(printed)["mirrored"]
+    assert asks.count("let go") == 4
 
 
 def test_command_takes_presses_from_the_file(tmp_path, capsys):

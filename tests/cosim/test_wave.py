@@ -1,8 +1,10 @@
 """`contactfpga wave`: its files are read back by another library, and hold what the sheet and the line did."""
 
 import bisect
+import contextlib
 import dataclasses
 import io
+import json
 import re
 
 import numpy as np
@@ -50,7 +52,12 @@ def written(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("wave")
     (folder / "skin.toml").write_text(SMALL.to_toml())
-    assert cli.main(["wave", "--skin", str(folder / "skin.toml"), "-o", str(folder / "touch.vcd")]) == 0
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        assert cli.main(["wave", "--skin", str(folder / "skin.toml"), "-o", str(folder / "touch.vcd"), "--json"]) == 0
+    answer = json.loads(printed.getvalue())
+    assert {*answer.pop("files")} == {str(folder / f"touch.{end}") for end in ("vcd", "gtkw", "sucl")}
+    assert 0 < answer["touched_us"] < answer["sent_us"] < 1e6 * answer["clocks"] / SMALL.clock_hz
+    assert answer["pressed"] == 4
     return folder
 
 

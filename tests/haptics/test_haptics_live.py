@@ -183,6 +183,10 @@ def test_zeros_are_read_set_and_written(files, tmp_path, capsys):
     made = LoadCells.load(better)
     assert made.zeros == pytest.approx([1000] * 3, abs=2)
     assert (made.surface, made.sheet_m, made.frame) == (Plane(), CORNER, "bumper")
+    assert cli.main(["haptics", "zero", address + "nothing", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["file"] is None
+    assert [one["set_steps"] for one in answer["units"]] == pytest.approx([1000] * 3, abs=2)
     assert cli.main(["haptics", "zero", address + "fingertip"]) == 2
     assert "pressed zones: 1" in capsys.readouterr().err
 
@@ -193,24 +197,27 @@ def test_thresholds_are_set_in_steps_and_newtons(files, capsys):
     said = capsys.readouterr().out
     assert "unit 0: raises contact from a deviation of 400 steps on" in said
     assert "sum 1: never raises contact" in said
-    assert cli.main(["haptics", "threshold", address + "nothing", "--unit", "2=8", "--units", units]) == 0
-    assert "400 steps" in capsys.readouterr().out
+    newtons = ["--unit", "2=8", "--units", units, "--sum", "1=0"]
+    assert cli.main(["haptics", "threshold", address + "nothing", *newtons, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == {"thresholds": [{"unit": 2, "steps": 400}, {"sum": 1, "steps": 0}]}
 
 
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
         ([], "no threshold is given"),
-        (["--unit", "3=1"], "--unit names unit 3; the board has 3, counted from 0"),
+        (["--unit", "0=1", "--unit", "3=1"], "--unit names unit 3; the board has 3, counted from 0"),
         (["--unit", "0=0.4"], "less than half a step"),
     ],
 )
 def test_thresholds_that_cannot_be(files, capsys, flags, message):
     address, _ = files
     assert cli.main(["haptics", "threshold", address + "nothing", *flags]) != 0
-    said = capsys.readouterr().err
+    out, said = capsys.readouterr()
     assert message in said
     assert "Traceback" not in said
+    assert out == "", "none is set"
 
 
 def test_units_that_do_not_fit_the_board_are_refused(files, tmp_path, capsys):

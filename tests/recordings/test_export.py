@@ -94,7 +94,14 @@ def test_bytes_that_could_not_be_used_are_counted(tmp_path, capsys):
     ):
         file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
     file.close()
-    assert cli.main(["export", str(tmp_path / "x.mcap"), str(tmp_path / "x.csv")]) == 0
+    words = ["export", str(tmp_path / "x.mcap"), str(tmp_path / "x.csv")]
+    assert cli.main([*words, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["unused_bytes"].keys() == {"late", "damaged", "deaf"}
+    assert answer["unused_bytes"]["deaf"] == len(b"".join(frames))
+    assert (answer["file"], answer["duration_s"]) == (words[2], 0)
+    assert answer["rows"] == len((tmp_path / "x.csv").read_text().splitlines()) - 1
+    assert cli.main(words) == 0
     said = [
         line.split(" bytes could not be used")[0] for line in capsys.readouterr().out.splitlines() if "used" in line
     ]

@@ -1,5 +1,6 @@
 """What is left of a recording after kill -9, on a full disk, and after damage."""
 
+import json
 import os
 import re
 import resource
@@ -282,6 +283,9 @@ def test_a_file_with_a_wrong_end_is_not_called_whole(closed, tmp_path, capsys, e
     """All messages are there, and yet it cannot be read as it is."""
     path, messages, _ = closed
     path.write_bytes(path.read_bytes()[:end] + more)
+    assert cli.main(["record", "--recover", str(path), str(tmp_path / "json.mcap"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["usable"], answer["beyond_bytes"], answer["messages"]) == (False, len(more), len(messages))
     assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     out = capsys.readouterr().out
     assert "Nothing is missing" not in out

@@ -64,7 +64,7 @@ def test_the_command_fails_where_nothing_meets_the_limits(file, tmp_path, shortc
     assert "it misses: barycenter off by" in said
     assert not output.exists()
     assert cli.main([*arguments, "--json"]) == UNSOLVED
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert (found["meets"], found["answer"]) == (False, None)
     assert found["nearest"]["reported"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 
@@ -106,6 +107,11 @@ def test_command_writes_a_table_that_loads(tube, tmp_path, capsys):
         f"{table}: 6x8 cells on 800 triangles\nneighbors lie 9.98 to 9.98 mm apart along rows (pitch 10), 10.00 to "
         "10.00 along columns (pitch 10)\n",
     )
+    assert cli.main(["body", "surface", str(tube), str(table), "--skin", str(skin), *placed, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    spacing_mm = pytest.approx(np.array([[9.98, 9.98], [10, 10]]), abs=0.01)
+    assert np.array(answer.pop("spacing_mm")) == spacing_mm
+    assert answer == {"file": str(table), "rows": 6, "columns": 8, "triangles": 800}
     read = Mesh.load(table)
     assert (read.lines, read.pitch_x_mm, read.closed) == ((6, 8), 10.0, False)
     assert read.place(0.0, 0.0)[0] == pytest.approx(tuple(POSE.apply(np.array([45.0, 0, 0]))), abs=0.02)

@@ -7,7 +7,7 @@ import functools
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
-from typing import Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from contactfpga import __version__, terminal
 from contactfpga.choices.choice import trusted
@@ -16,6 +16,9 @@ from contactfpga.inputs.values import shortened, suggestion, visible_lines
 from contactfpga.shipped import with_pages
 from contactfpga.tools import commands
 from contactfpga.tools.console import interrupt, outputs
+
+if TYPE_CHECKING:
+    from contactfpga.tools.console.flags import Flags
 
 COMMANDS = {
     "zones": "Show the contact zones live.",
@@ -73,7 +76,7 @@ class Subcommand(Protocol):
     def EXTRA(self) -> str | None:  # noqa: N802
         """The extra with all needs of the command; None if they depend on the port."""
 
-    def add_flags(self, parser: argparse.ArgumentParser) -> None:
+    def add_flags(self, flag: Flags) -> None:
         """Add the command's flags to its parser."""
 
     def run(self, args: argparse.Namespace) -> int:
@@ -171,7 +174,9 @@ def _add_topic(group: TopicGroup, module: str, parser: Parser) -> None:
 
 
 def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Namespace], int]) -> None:
-    command.add_flags(parser)
+    from contactfpga.tools.console.flags import Flags  # with the driver, which the list of commands does without
+
+    command.add_flags(Flags(parser))
     parser.add_argument("--trust", action="store_true", help="Import, and so run, modules that Skin files name.")
     parser.set_defaults(run=run, extra=command.EXTRA)
 

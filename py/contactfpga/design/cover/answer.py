@@ -37,6 +37,9 @@ class NoSolution:
     def __str__(self) -> str:
         return f"no solution: {self.reason}"
 
+    def to_dict(self) -> dict[str, str]:
+        return {"no_solution": self.reason}
+
 
 def positive(name: str, value: float, unit: str) -> float:
     """Check that ``value`` is finite and above 0; raises :class:`CoverError`."""

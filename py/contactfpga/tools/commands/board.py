@@ -12,11 +12,10 @@ from contactfpga.tools.console import flags
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.design(parser, "Skin of the board (default: the reference Skin).")
-    touching = "What touches the sheet: a scene's name or a .npy file (default: nothing)."
-    parser.add_argument("--scene", metavar="NAME", help=touching)
-    parser.add_argument("--symlink", metavar="PATH", help="Create this symbolic link to the pseudo-terminal.")
+def add_flags(flag: flags.Flags) -> None:
+    flags.design(flag, "Skin of the board (default: the reference Skin).")
+    flag("--scene NAME", "What touches the sheet: a scene's name or a .npy file (default: nothing).")
+    flag("--symlink PATH", "Create this symbolic link to the pseudo-terminal.")
 
 
 def run(args: argparse.Namespace) -> int:

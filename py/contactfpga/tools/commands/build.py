@@ -19,23 +19,21 @@ from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_
 from contactfpga.errors import UNSOLVED, ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = "boards"
 
 BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec."
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
-    flags.design(parser, "Skin to build (default: one that fits the board).")
-    flags.output(parser, "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit).", "DIR")
-    start = "Seed of place and route (default: 1)."
-    parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
-    check = "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would."
-    parser.add_argument("--check", action="store_true", help=check)
-    parser.add_argument("--wiring", action="store_true", help="Only print the wiring table; build nothing.")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("[BOARD]", f"{BOARD} With --kit it is the kit's.")
+    flags.design(flag, "Skin to build (default: one that fits the board).")
+    flags.output(flag, "Folder for the results (default: build/BOARD, or build/kits/NAME of a kit).", "DIR")
+    flag("--seed N", "Seed of place and route.", numbers.whole(0, 2**31 - 1), 1)
+    flag("--check", "Only say whether pins, clock, baud, circuit, size and speed go together, and which values would.")
+    flag("--wiring", "Only print the wiring table; build nothing.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -50,11 +48,8 @@ def run(args: argparse.Namespace) -> int:
     board.check(design)
     table = WiringTable(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))
     built = {} if args.wiring else _built(args, board, design)
-    if args.json:
-        described = {"skin": design.changed} if isinstance(design, Skin) else {"sheets": _changed(design)}
-        print(json.dumps({"board": board.name, **described, **built, **table.to_dict()}))
-    else:
-        table.show()
+    described = {"skin": design.changed} if isinstance(design, Skin) else {"sheets": _changed(design)}
+    results.show(args, {"board": board.name, **described, **built, **table.to_dict()}, table.show)
     return 0
 
 
@@ -81,13 +76,11 @@ def _check(args: argparse.Namespace, board: BoardSpec, design: Skin | Several) -
         changes = buildable.proposed(board, design, circuit)
         with tempfile.TemporaryDirectory() as folder:
             report = build.build(design.replace(**changes), board, Path(folder), args.seed)
-        answer |= {"changes": changes, "report": dataclasses.asdict(report)}
+        answer |= {"changes": changes, "report": report}
     except (ContactFPGAError, build.BitstreamFailed) as error:
         answer["unsolved"] = str(error)
-    if args.json:
-        print(json.dumps(answer))
-    else:
-        _show_check(board, answer, circuit is not None, report.lines() if "report" in answer else [])
+    size = report.lines() if "report" in answer else []
+    results.show(args, answer, lambda: _show_check(board, answer, circuit is not None, size))
     return UNSOLVED if any(answer["problems"].values()) or "unsolved" in answer else 0
 
 
@@ -126,7 +119,7 @@ def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> 
     if not args.json:
         print(f"{board.title}, {_described(skin)}", *report.lines(), sep="\n")
         print(f"{'bitstream':12} {bitstream}")
-    return {"bitstream": bitstream, "report": dataclasses.asdict(report)}
+    return {"bitstream": bitstream, "report": report}
 
 
 def _described(skin: Skin | Several) -> str:

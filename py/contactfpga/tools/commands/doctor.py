@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -19,7 +18,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.instruments.self_test import LineFinding, SelfTest, untried
 from contactfpga.instruments.watch import Cell, Suspicion, Watch, named
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, interrupt, live, numbers
+from contactfpga.tools.console import flags, interrupt, live, numbers, results
 from contactfpga.zones.zone import Zones
 
 EXTRA = None
@@ -38,18 +37,17 @@ ZONES_ONLY = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
     long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
-    watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
-    parser.add_argument("--watch", action="store_true", help=watch)
+    flag("--seconds S", long, numbers.SECONDS)
+    flag("--watch", "Follow the board while you touch every switch; name those that are stuck, loose or dead.")
     tested = "Have the board drive each line alone, again and again while you press every place; name joined lines."
-    parser.add_argument("--self-test", action="store_true", help=tested)
+    flag("--self-test", tested)
     stuck = "Seconds without a change after which --watch reports a pressed switch (default: 10)."
-    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="S", help=stuck)
-    parser.add_argument("--list", action="store_true", help="Listen to all ports; list the boards and their names.")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
+    flag("--stuck-s S", stuck, numbers.SECONDS)
+    flag("--list", "Listen to all ports; list the boards and their names.")
+    flags.json(flag, "Print one JSON object: findings and counters.")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
         return _self_test(args)
     report = _Report(silent=args.json)
     _look(args, report)
-    if args.json:
-        print(json.dumps(report.to_dict()), flush=True)
+    results.show(args, report)
     return min(report.faults, 1)
 
 
@@ -90,14 +87,19 @@ class _Report:
     def to_dict(self) -> dict[str, object]:
         return {
             "faults": self.faults,
-            "findings": [finding._asdict() for finding in self._findings],
+            "findings": self._findings,
             "lines": self.lines,
-            "stats": self.stats and self.stats.to_dict(),
+            "stats": self.stats,
         }
 
 
 def _say(finding: Finding) -> None:
     terminal.say(_line(finding), hang=6)
+
+
+def _say_all(findings: Iterable[Finding]) -> None:
+    for one in findings:
+        _say(one)
 
 
 def _line(finding: Finding) -> str:
@@ -108,15 +110,16 @@ def _list(args: argparse.Namespace) -> int:
     skin = Skin.load(args.skin) if args.skin else None
     heard = finding.survey(finding.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
     boards = [one for one in heard if one.hello is not None]
-    if args.json:
-        print(json.dumps([_listed(one) for one in heard]), flush=True)
-    else:
-        for one in heard:
-            terminal.say(f"{'ok' if one.hello else 'note':5} {one}", hang=6)
-        if not boards:
-            named = f"ports without USB ids, as of `contactfpga board`, are listened to where {finding.MORE} names them"
-            terminal.say(f"fault no board said hello; is one plugged in, and its bitstream loaded? {named}", hang=6)
+    results.show(args, [_listed(one) for one in heard], lambda: _show_list(heard, bool(boards)))
     return 0 if boards else 1
+
+
+def _show_list(heard: list[finding.Reply], some: bool) -> None:
+    for one in heard:
+        terminal.say(f"{'ok' if one.hello else 'note':5} {one}", hang=6)
+    if not some:
+        named = f"ports without USB ids, as of `contactfpga board`, are listened to where {finding.MORE} names them"
+        terminal.say(f"fault no board said hello; is one plugged in, and its bitstream loaded? {named}", hang=6)
 
 
 def _listed(one: finding.Reply) -> dict[str, object]:
@@ -180,17 +183,17 @@ def _watch(args: argparse.Namespace) -> int:
 
         seconds, end = live.follow(board, args, take, None if args.json else render)
         findings = [*map(suspected, found), *_coverage(watch), *_without_mask(skin), *end]
-    mask_line = watch.mask_line
     faults = sum(finding.verdict == "fault" for finding in findings)
-    if args.json:
-        print(json.dumps(_watched(watch, findings, seconds, faults)), flush=True)
-        return min(faults, 1)
-    for one in findings if terminal.of().live else findings[len(found) :]:
-        _say(one)
-    if mask_line:
-        where = "in the Skin's file" if skin is not None else "in the Skin's file, beside the cells that are there"
-        terminal.say(f"To go on without what is stuck, put this line {where}, and build again:\n{mask_line}")
+    left = findings if terminal.of().live else findings[len(found) :]
+    results.show(args, _watched(watch, findings, seconds, faults), lambda: _show_watched(left, watch, skin))
     return min(faults, 1)
+
+
+def _show_watched(findings: list[Finding], watch: Watch, skin: Skin | None) -> None:
+    _say_all(findings)
+    if watch.mask_line:
+        where = "in the Skin's file" if skin is not None else "in the Skin's file, beside the cells that are there"
+        terminal.say(f"To go on without what is stuck, put this line {where}, and build again:\n{watch.mask_line}")
 
 
 def suspected(suspicion: Suspicion) -> Finding:
@@ -229,9 +232,9 @@ def _watched(watch: Watch, findings: list[Finding], seconds: float, faults: int)
     seen = watch.seen
     return {
         "faults": faults,
-        "findings": [finding._asdict() for finding in findings],
+        "findings": findings,
         "seconds": seconds,
-        "seen": None if seen is None else [[int(cell) for cell in row] for row in seen],
+        "seen": None if seen is None else seen.astype(int),
         "never": watch.never,
         "stuck": watch.stuck,
         "fluttering": watch.fluttering,
@@ -255,15 +258,11 @@ def _self_test(args: argparse.Namespace) -> int:
                     known.append(finding)
                     if not args.json:
                         _say(tested(finding))
-        end = _tests_end(known, tests, pressed, last)
+        end = list(_tests_end(known, tests, pressed, last))
     faults = sum(finding.kind == "fault" for finding in known)
-    if args.json:
-        found = [finding._asdict() for finding in [*map(tested, known), *end]]
-        answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
-        print(json.dumps(answer), flush=True)
-        return min(faults, 1)
-    for said in end:
-        _say(said)
+    found = [*map(tested, known), *end]
+    answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
+    results.show(args, answer, lambda: _say_all(end))
     return min(faults, 1)
 
 

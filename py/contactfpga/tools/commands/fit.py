@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 import sys
 from collections.abc import Callable
@@ -14,7 +13,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
@@ -24,8 +23,12 @@ if TYPE_CHECKING:
 
 EXTRA = "chart"
 
-PERCENT = numbers.number(0, 100, "%", above=True)
 
+def _goal(most: float, unit: str) -> Callable[[str], float | None]:
+    return numbers.or_none(numbers.number(0, most, unit, above=True))
+
+
+PERCENT = _goal(100, "%")
 
 ORDER = (
     "The answer has the fewest wires (rows and columns) of all that meet the goals; of these the fewest LUT4, then the "
@@ -33,73 +36,46 @@ ORDER = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = ORDER
+def add_flags(flag: flags.Flags) -> None:
+    flag.parser.epilog = ORDER
     what = "A .toml file of scenes, a .npz or .npy recording, or the name of a family or scene (docs/scenes.md)."
-    parser.add_argument("scenes", nargs="+", metavar="SCENES", help=what)
-    _goal_flags(parser.add_argument_group("what the Skin must meet for each of SCENES; none means no limit"))
-    _candidate_flags(parser.add_argument_group("what is tried"))
-    count, usual = numbers.whole(2, 1_000_000), "Number of scenes to choose with (default: the file's, or 500)."
-    parser.add_argument("--placements", type=count, metavar="N", help=usual)
-    above = "Count cells of recordings above this as pressed; needed for numbers."
-    parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
-    parser.add_argument(
-        "--seed", type=numbers.SEED, metavar="N", help="Seed of the places (default: the file's, or 0)."
-    )
-    parser.add_argument(
-        "--quick", action="store_true", help="Do not check which of the refused Skins with as many wires are cheaper."
-    )
-    flags.workers(parser)
-    flags.output(parser, "Write the Skin to this TOML file.")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flag("SCENES ...", what)
+    _goal_flags(flag.group("what the Skin must meet for each of SCENES; none means no limit"))
+    _candidate_flags(flag.group("what is tried"))
+    usual = "Number of scenes to choose with (default: the file's, or 500)."
+    flag("--placements N", usual, numbers.whole(2, 1_000_000))
+    flag("--threshold X", "Count cells of recordings above this as pressed; needed for numbers.", numbers.CELL)
+    flag("--seed N", "Seed of the places (default: the file's, or 0).", numbers.SEED)
+    flag("--quick", "Do not check which of the refused Skins with as many wires are cheaper.")
+    flags.workers(flag)
+    flags.output(flag, "Write the Skin to this TOML file.")
+    flags.json(flag)
 
 
-def _goal_flags(goals: argparse._ArgumentGroup) -> None:
-    far, late = numbers.number(0, 10_000, "mm", above=True), numbers.number(0, 1e9, "us", above=True)
-    area = numbers.number(0, 100_000, "%", above=True)
-    _limit(goals, "--miscounted", "PERCENT", PERCENT, 5.0, "Scenes whose numbers of zones and contacts differ")
-    _limit(goals, "--missed", "PERCENT", PERCENT, 5.0, "Contacts without a zone")
-    _limit(goals, "--barycenter-mm", "MM", far, 5.0, "Mean distance of barycenters from those of the contacts")
-    _limit(goals, "--area", "PERCENT", area, None, "Mean error of a contact's area")
-    felt = numbers.number(0, 99.999, "%", above=True)
-    _limit(goals, "--felt", "PERCENT", felt, 99.0, "At least so many fingertips are felt; of covers that know forces")
-    force = numbers.number(0, 1000, "N", above=True)
-    goals.add_argument("--felt-n", type=force, default=2.0, metavar="N", help="Force of these fingertips (default: 2).")
-    _limit(goals, "--latency-us", "US", late, 1000.0, "Worst time from the touch to the last byte")
+def _goal_flags(goals: flags.Flags) -> None:
+    goals("--miscounted PERCENT", "Scenes whose numbers of zones and contacts differ.", PERCENT, 5.0)
+    goals("--missed PERCENT", "Contacts without a zone.", PERCENT, 5.0)
+    goals("--barycenter-mm MM", "Mean distance of barycenters from those of the contacts.", _goal(10_000, "mm"), 5.0)
+    goals("--area PERCENT", "Mean error of a contact's area (default: none).", _goal(100_000, "%"))
+    felt = "At least so many fingertips are felt; of covers that know forces."
+    goals("--felt PERCENT", felt, _goal(99.999, "%"), 99.0)
+    goals("--felt-n N", "Force of these fingertips.", numbers.number(0, 1000, "N", above=True), 2.0)
+    goals("--latency-us US", "Worst time from the touch to the last byte.", _goal(1e9, "us"), 1000.0)
 
 
-def _limit(
-    goals: argparse._ArgumentGroup,
-    flag: str,
-    unit: str,
-    kind: Callable[[str], float],
-    usual: float | None,
-    what: str,
-) -> None:
-    shown = "none" if usual is None else f"{usual:g}"
-    told = f"{what} (default: {shown}).".replace("%", "%%")
-    goals.add_argument(flag, type=numbers.or_none(kind), default=usual, metavar=unit, help=told)
-
-
-def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
+def _candidate_flags(tried: flags.Flags) -> None:
     fixed = "Skin that gives all settings but pitch, labeller, scan, and, where it has none, cover: these are chosen."
-    tried.add_argument("--skin", metavar="FILE", help=fixed)
-    pitch = "Try only this pitch; can be repeated."
-    tried.add_argument("--pitch-mm", type=numbers.PITCH_MM, action="append", metavar="MM", help=pitch)
+    tried("--skin FILE", fixed)
+    tried("--pitch-mm MM ...", "Try only this pitch; can be repeated.", numbers.PITCH_MM)
     cover = "Try only this cover: bare, paper, caps or tiles; can be repeated (default: caps and tiles)."
-    tried.add_argument("--cover", metavar="NAME", action="append", help=cover)
+    tried("--cover NAME ...", cover)
     dome = "Try only this closing force of the switches under caps and tiles; can be repeated (default: 0.15 to 1 N)."
-    tried.add_argument("--dome-n", type=numbers.number(0.001, 1000, "N"), metavar="N", action="append", help=dome)
-    foam = "Thickness of the foam on caps and tiles (default: 2)."
-    tried.add_argument("--foam-mm", type=numbers.number(0.01, 1000, "mm"), metavar="MM", default=2.0, help=foam)
-    labeller = "Try only this labeller, cells, or module:attribute of your own; can be repeated."
-    tried.add_argument("--labeller", action="append", metavar="NAME", help=labeller)
-    scan = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
-    tried.add_argument("--scan", action="append", metavar="NAME", help=scan)
-    baud = "Try this baud rate; can be repeated (default: the Skin's)."
-    tried.add_argument("--baud", type=numbers.BAUD, action="append", metavar="N", help=baud)
-    host = "Accept bitmaps too: the host finds their zones in this time."
-    tried.add_argument("--host-us", type=numbers.number(0, 1e9, "us"), metavar="US", help=host)
+    tried("--dome-n N ...", dome, numbers.number(0.001, 1000, "N"))
+    tried("--foam-mm MM", "Thickness of the foam on caps and tiles.", numbers.number(0.01, 1000, "mm"), 2.0)
+    tried("--labeller NAME ...", "Try only this labeller, cells, or module:attribute of your own; can be repeated.")
+    tried("--scan NAME ...", "Try only this scan; can be repeated (default: all that the Skin's columns can have).")
+    tried("--baud N ...", "Try this baud rate; can be repeated (default: the Skin's).", numbers.BAUD)
+    tried("--host-us US", "Accept bitmaps too: the host finds their zones in this time.", numbers.number(0, 1e9, "us"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -114,11 +90,8 @@ def run(args: argparse.Namespace) -> int:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
             found = fit(task, tried, executor, step, so_far)
     except KeyboardInterrupt:
-        raise Interruption(_kept(so_far, len(tried), args.json)) from None
-    if args.json:
-        print(json.dumps(show.plain(found)), flush=True)
-    else:
-        show.printed(found)
+        raise Interruption(_kept(so_far, len(tried), args)) from None
+    results.show(args, show.plain(found), lambda: show.printed(found))
     if output and found.answer:
         command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
         write_text(output, show.toml(found, command))
@@ -190,14 +163,11 @@ def _share(percent: float | None) -> float | None:
     return None if percent is None else percent / 100
 
 
-def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
+def _kept(so_far: SoFar, of: int, args: argparse.Namespace) -> str:
     from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"
     if not so_far:
         return f"interrupted before the first of {of} candidates was measured; {again}"
-    if as_json:
-        print(json.dumps(show.plain_so_far(so_far.values())), flush=True)
-    else:
-        show.printed_so_far(so_far.values())
+    results.show(args, show.plain_so_far(so_far.values()), lambda: show.printed_so_far(so_far.values()))
     return f"interrupted; of {of} candidates {len(so_far)} were measured, and no answer was chosen; {again}"

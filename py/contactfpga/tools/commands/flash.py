@@ -18,11 +18,10 @@ from contactfpga.tools.console import flags
 EXTRA = "boards"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("board", metavar="BOARD", nargs="?", help=f"{BOARD} With --kit it is the kit's.")
-    usual = "Bitstream (default: the one in build/BOARD; of a kit, that of the release, or one is built)."
-    parser.add_argument("file", nargs="?", metavar="FILE", help=usual)
-    flags.kit(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flag("[BOARD]", f"{BOARD} With --kit it is the kit's.")
+    flag("[FILE]", "Bitstream (default: the one in build/BOARD; of a kit, that of the release, or one is built).")
+    flags.kit(flag)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,15 +11,11 @@ from contactfpga.tools.console import flags, outputs
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.sheet(parser, "Skin of the core (default: the reference Skin).")
-    parser.add_argument(
-        "--name",
-        default="contactfpga_core",
-        metavar="NAME",
-        help="Module, and beginning of the names of all other modules (default: %(default)s).",
-    )
-    flags.output_folder(parser, "build/ip")
+def add_flags(flag: flags.Flags) -> None:
+    flags.sheet(flag, "Skin of the core (default: the reference Skin).")
+    text = "Module, and beginning of the names of all other modules (default: %(default)s)."
+    flag("--name NAME", text, default="contactfpga_core")
+    flags.output_folder(flag, "build/ip")
 
 
 def run(args: argparse.Namespace) -> int:

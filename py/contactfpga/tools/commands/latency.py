@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga import boards, terminal
+from contactfpga import boards
 from contactfpga.driver import health
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.finger.stages import Finger
@@ -26,24 +25,20 @@ BOARD = "icebreaker"
 ENDINGS = (".svg", ".png")
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.sheet(parser, "Skin to measure (default: that of --board, else the reference Skin).")
+def add_flags(flag: flags.Flags) -> None:
+    flags.sheet(flag, "Skin to measure (default: that of --board, else the reference Skin).")
     bridge = f"Board whose USB bridge is taken: {', '.join(boards.BOARDS)}, or one of your own (default: {BOARD})."
-    parser.add_argument("--board", metavar="NAME", help=bridge)
-    size = "Rows and columns of the contact (default: 3x3, a fingertip)."
-    parser.add_argument("--cells", type=_cells, default=(3, 3), metavar="HxW", help=size)
+    flag("--board NAME", bridge)
+    flag("--cells HxW", "Rows and columns of the contact (default: 3x3, a fingertip).", _cells, (3, 3))
     count = "Number of places to touch, spread over the sheet (default: every place)."
-    parser.add_argument("--touches", type=numbers.whole(1, 4096), metavar="N", help=count)
+    flag("--touches N", count, numbers.whole(1, 4096))
     own = health.LATENCY_MS
     timer = f"Latency timer of the bridge in ms (default: {own}, as `contactfpga doctor` advises; a new bridge has 16)."
-    parser.add_argument("--timer", type=numbers.whole(1, 255, "ms"), default=own, metavar="MS", help=timer)
-    event = "Take a bridge without event character, as a new one is."
-    parser.add_argument("--no-event-char", action="store_true", help=event)
-    exact = "Leave out the host's share, which is measured on this machine and varies."
-    parser.add_argument("--exact", action="store_true", help=exact)
-    picture = "Draw a bar for each stage, SVG or PNG by the ending."
-    parser.add_argument("--picture", metavar="FILE", help=picture)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flag("--timer MS", timer, numbers.whole(1, 255, "ms"), own)
+    flag("--no-event-char", "Take a bridge without event character, as a new one is.")
+    flag("--exact", "Leave out the host's share, which is measured on this machine and varies.")
+    flag("--picture FILE", "Draw a bar for each stage, SVG or PNG by the ending.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,13 +60,9 @@ def run(args: argparse.Namespace) -> int:
 
         sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud"
         picture.save(found, f"{sheet}, {board.bridge.chip} of {board.title}", path)
-    if args.json:
-        print(json.dumps(found.as_json()))
-        return 0
-    for title, what in (*_board_lines(skin, args.cells, found), *_host_lines(board.title, found, args.exact)):
-        terminal.say(f"{title:22}{what}", hang=22)
-    if path is not None:
-        terminal.say(f"{'picture':22}{path}", hang=22)
+    rows = *_board_lines(skin, args.cells, found), *_host_lines(board.title, found, args.exact)
+    drawn = [] if path is None else [("picture", str(path))]
+    results.show(args, found.as_json(), lambda: results.table(*rows, *drawn))
     return 0
 
 

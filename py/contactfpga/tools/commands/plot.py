@@ -13,12 +13,10 @@ EXTRA = "view"
 ENDINGS = (".png", ".svg")
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    what = "File of `contactfpga record` or of `contactfpga zones --record`."
-    parser.add_argument("recording", metavar="RECORDING", help=what)
-    flags.output(parser, "PNG or SVG, by its ending (default: RECORDING.png, in this folder).")
-    link = "Board to draw from a recording of several (default: the first)."
-    parser.add_argument("--link", metavar="NAME", help=link)
+def add_flags(flag: flags.Flags) -> None:
+    flag("RECORDING", "File of `contactfpga record` or of `contactfpga zones --record`.")
+    flags.output(flag, "PNG or SVG, by its ending (default: RECORDING.png, in this folder).")
+    flag("--link NAME", "Board to draw from a recording of several (default: the first).")
 
 
 def run(args: argparse.Namespace) -> int:

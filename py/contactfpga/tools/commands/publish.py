@@ -34,21 +34,19 @@ SHOWN_S = 0.2
 """Interval of checks; boards lost within it, as all sheets of one FPGA, are reported together."""
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("ports", nargs="*", metavar="PORT", help=PORTS)
-    flags.reading(parser)
-    key = "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint)."
-    parser.add_argument("--key", help=key)
+def add_flags(flag: flags.Flags) -> None:
+    flag("[PORT ...]", PORTS, dest="ports")
+    flags.reading(flag)
+    flag("--key KEY", "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint).")
     listen = "Listen there, such as tcp/0.0.0.0:7447 for all (default: a Unix socket that only your programs reach)."
-    parser.add_argument("--listen", metavar="ENDPOINT", help=listen)
-    parser.add_argument("--connect", metavar="ENDPOINT", help="Do not listen; connect to the router there.")
-    parser.add_argument("--config", metavar="FILE", help="Zenoh's own configuration (JSON5): TLS, users, access.")
+    flag("--listen ENDPOINT", listen)
+    flag("--connect ENDPOINT", "Do not listen; connect to the router there.")
+    flag("--config FILE", "Zenoh's own configuration (JSON5): TLS, users, access.")
     batch = "Collect bytes for T ms before sending them (default: 2; 0: send at once)."
-    parser.add_argument("--batch-ms", type=numbers.number(0, 1000, "ms"), default=2.0, metavar="T", help=batch)
-    slow = "When the network is too slow: block until it takes more, or drop (default: block)."
-    parser.add_argument("--congestion", choices=("block", "drop"), default="block", help=slow)
-    allow = "Pass commands on to the board too, not only requests for frames."
-    parser.add_argument("--allow-commands", action="store_true", help=allow)
+    flag("--batch-ms T", batch, numbers.number(0, 1000, "ms"), 2.0)
+    slow = "When the network is too slow: block until it takes more, or drop."
+    flag("--congestion", slow, ("block", "drop"), "block")
+    flag("--allow-commands", "Pass commands on to the board too, not only requests for frames.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,13 +12,14 @@ from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
-from contactfpga.tools.console import flags, interrupt, numbers
+from contactfpga.tools.console import flags, interrupt, numbers, results
 from contactfpga.tools.console.forces import Forces
 
 if TYPE_CHECKING:
     from contactfpga.robot.body import Body
     from contactfpga.robot.body.plan import Plan
     from contactfpga.robot.ros.feed import Felt
+    from contactfpga.tools.recordings.recover import RecoveryReport
     from contactfpga.tools.recordings.session import Session
 
 EXTRA = "record"
@@ -26,22 +27,20 @@ EXTRA = "record"
 SHOWN_S = 0.5
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    file = "File to write; it must not exist yet. With --recover: the file to repair; it is not changed."
-    parser.add_argument("file", metavar="FILE.mcap", help=file)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.mcap", "File to write; it must not exist yet. With --recover: the file to repair; it is not changed.")
     robot = "or ROBOT.toml for all boards of a robot (docs/body.md)."
     into = "With --recover: the new file (default: FILE_recovered.mcap)."
-    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, {robot} {into}")
-    flags.seconds(parser)
+    flags.connection(flag, f"{flags.PORT.removesuffix('.')}, {robot} {into}")
+    flags.seconds(flag)
     megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
-    parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
-    seconds = "The same, each this many seconds long."
-    parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
-    flags.forces(parser, "Add forces")
+    flag("--split-mb MB", megabytes, numbers.number(0.1, 1e6, "MB"))
+    flag("--split-s S", "The same, each this many seconds long.", numbers.number(1, 86_400, "s"))
+    flags.forces(flag, "Add forces")
     bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."
-    parser.add_argument("--bytes-only", action="store_true", help=bare)
-    recover = "Record nothing; repair a recording whose program was killed or whose disk was full."
-    parser.add_argument("--recover", action="store_true", help=recover)
+    flag("--bytes-only", bare)
+    flag("--recover", "Record nothing; repair a recording whose program was killed or whose disk was full.")
+    flags.json(flag, "Print one JSON object at the end: files, frames and bytes; with --recover what is left out.")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,7 +59,7 @@ def _record(args: argparse.Namespace) -> int:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
     about = {} if body is None else {packed.ROBOT: packed.pack(args.port)}
     session = Session(args.file, split, args.bytes_only, about=about)
-    progress = _Progress(session)
+    progress = _Progress(session, args)
     try:
         with session:
             _add(session, args, body)
@@ -115,13 +114,27 @@ def _recover(args: argparse.Namespace) -> int:
         if getattr(args, name) not in (None, False):
             raise ContactFPGAError(f"--{name.replace('_', '-')} is for a recording that is made; --recover repairs one")
     found = recover(args.file, args.port)
+    answer = {
+        "file": found.path,
+        "messages": found.messages,
+        "duration_s": found.seconds,
+        "recordings": found.recordings,
+        "usable": found.usable,
+        "cut_bytes": found.cut,
+        "damaged_pieces": found.damaged,
+        "omitted": found.omitted,
+        "beyond_bytes": found.beyond,
+    }
+    results.show(args, answer, lambda: _show_recovered(args.file, found))
+    return 0
+
+
+def _show_recovered(file: str, found: RecoveryReport) -> None:
     terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
     if found.recordings > 1:
-        terminal.say(
-            f"{args.file} holds {found.recordings} recordings, one after the other; the new file has them all."
-        )
+        terminal.say(f"{file} holds {found.recordings} recordings, one after the other; the new file has them all.")
     elif found.usable:
-        terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
+        terminal.say(f"Nothing is missing: {file} was closed and whole, so you can use it as it is.")
     if found.cut:
         terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
     if found.damaged:
@@ -130,7 +143,6 @@ def _recover(args: argparse.Namespace) -> int:
         terminal.say(f"Left out: {count:,} {what}.")
     if found.beyond:
         terminal.say(f"Left out after the end: {found.beyond:,} bytes that are no recording.")
-    return 0
 
 
 def _pieces(count: int) -> str:
@@ -138,8 +150,8 @@ def _pieces(count: int) -> str:
 
 
 class _Progress:
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, args: argparse.Namespace) -> None:
+        self._session, self._args = session, args
         self._live = terminal.of(sys.stderr).live
         self._due_s = time.monotonic() + SHOWN_S
         self._shown = False
@@ -155,7 +167,18 @@ class _Progress:
             print("\r", end="\033[K", file=sys.stderr, flush=True)
         session = self._session
         if session.links:
-            terminal.say(f"{', '.join(map(str, session.files))}: {self._line()}")
+            answer = {
+                "files": session.files,
+                "duration_s": session.seconds,
+                "frames": session.frames,
+                "bytes": session.size,
+                "links": [
+                    {"name": one.name, "error": one.error and str(one.error), "notes": one.notes}
+                    for one in session.links
+                ],
+            }
+            files = ", ".join(map(str, session.files))
+            results.show(self._args, answer, lambda: terminal.say(f"{files}: {self._line()}"))
         for link in session.links:
             lost = [f"{link.name}: {link.error}"] if link.error is not None and len(session.links) > 1 else []
             for note in link.notes + lost:

@@ -8,25 +8,21 @@ import time
 
 from contactfpga import terminal
 from contactfpga.skin import Skin
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("frames", metavar="FRAMES.npy", help="Array (frames, rows, columns) of bool or numbers.")
-    joined = "Neighbors of a cell: 8 with corners, 4 without (default: 8)."
-    parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help=joined)
-    above = "Count cells above this as pressed; needed for numbers."
-    parser.add_argument("--threshold", type=numbers.CELL, metavar="X", help=above)
-    pitch = "Distance between rows and between columns in mm (default: 10)."
-    parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, metavar="MM", help=pitch)
-    bits = numbers.whole(*Skin.limits("barycenter_bits"))
+def add_flags(flag: flags.Flags) -> None:
+    flag("FRAMES.npy", "Array (frames, rows, columns) of bool or numbers.")
+    flag("--connectivity", "Neighbors of a cell: 8 with corners, 4 without.", (4, 8), 8)
+    flag("--threshold X", "Count cells above this as pressed; needed for numbers.", numbers.CELL)
+    flag("--pitch-mm MM", "Distance between rows and between columns in mm.", numbers.PITCH_MM, 10.0)
     divided = "Divide barycenters on the board, to 1/2^K cell (default: the host divides)."
-    parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
+    flag("--barycenter-bits K", divided, numbers.whole(*Skin.limits("barycenter_bits")))
     ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."
-    parser.add_argument("--closed", action="store_true", help=ends)
-    parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
+    flag("--closed", ends)
+    flags.json(flag, flags.FRAMES)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,12 +42,11 @@ def run(args: argparse.Namespace) -> int:
         late.append(result.last_record or 0)
     seconds = time.monotonic() - started
     closed = ", ends meet" if skin.closed else ""
-    for title, what in (
+    results.table(
         ("frames", f"{len(frames)} of {skin.rows}x{skin.columns}, {skin.connectivity}-connectivity{closed}"),
         ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
         ("last record", f"at most {max(late)} clocks after a frame's last row"),
         ("speed", f"{len(frames) / seconds:,.0f} frames per second, once compiled"),
-    ):
-        terminal.say(f"{title:20}{what}", hang=20)
+    )
     terminal.say("Every frame came back exactly once. Use --json for one JSON object per frame.")
     return 0

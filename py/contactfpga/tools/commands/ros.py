@@ -13,39 +13,21 @@ from contactfpga.tools.console.forces import Forces
 EXTRA = "ros"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
     name = "Namespace of the topics (default: skin, so that zones are in /skin/zones)."
-    parser.add_argument("--namespace", metavar="NAME", default="skin", help=name)
-    frame = "Name of the link's frame (default: the board's name, or skin)."
-    parser.add_argument("--frame", metavar="NAME", default="", help=frame)
-    parent = "Publish where the link's frame lies in this one, on /tf_static."
-    parser.add_argument("--parent", metavar="NAME", default="", help=parent)
-    place = "Origin of the link's frame there, in m (default: 0 0 0)."
-    parser.add_argument(
-        "--origin-m",
-        nargs=3,
-        type=numbers.number(-100, 100, "m"),
-        metavar=("X", "Y", "Z"),
-        default=(0.0, 0.0, 0.0),
-        help=place,
-    )
-    turn = (
-        "Its roll, pitch and yaw in rad: turns about the fixed x, y and z axes, one after the other (default: 0 0 0)."
-    )
-    parser.add_argument(
-        "--rpy", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
-    )
-    rate = "Publish zones, tracks and contacts at most at this rate (default: 1000)."
-    parser.add_argument(
-        "--zones-hz", type=numbers.number(0, 1e5, "Hz", above=True), metavar="HZ", default=1000.0, help=rate
-    )
-    flags.forces(parser, "Publish forces too")
-    domain = "ROS_DOMAIN_ID (default: 0)."
-    parser.add_argument("--domain", type=numbers.whole(0, MAX_DOMAIN), metavar="ID", default=0, help=domain)
-    network = "Reach nodes on other computers too; without it only those on this one."
-    parser.add_argument("--network", action="store_true", help=network)
-    flags.seconds(parser)
+    flag("--namespace NAME", name, default="skin")
+    flag("--frame NAME", "Name of the link's frame (default: the board's name, or skin).", default="")
+    flag("--parent NAME", "Publish where the link's frame lies in this one, on /tf_static.", default="")
+    flag("--origin-m X Y Z", "Origin of the link's frame there, in m.", numbers.number(-100, 100, "m"), (0.0, 0.0, 0.0))
+    turn = "Its roll, pitch and yaw in rad: turns about the fixed x, y and z axes, one after the other."
+    flag("--rpy R P Y", turn, numbers.TURN, (0.0, 0.0, 0.0))
+    rate = "Publish zones, tracks and contacts at most at this rate."
+    flag("--zones-hz HZ", rate, numbers.number(0, 1e5, "Hz", above=True), 1000.0)
+    flags.forces(flag, "Publish forces too")
+    flag("--domain ID", "ROS_DOMAIN_ID.", numbers.whole(0, MAX_DOMAIN), 0)
+    flag("--network", "Reach nodes on other computers too; without it only those on this one.")
+    flags.seconds(flag)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from typing import Any
 
 from contactfpga import helptext, terminal
@@ -15,38 +14,34 @@ from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.design.circuit.values import LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
+def add_flags(flag: flags.Flags) -> None:
     skin = "Skin that gives rows, columns, diodes and the table [circuit]; flags below replace values of that table."
-    flags.sheet(parser, skin)
+    flags.sheet(flag, skin)
     lines = numbers.whole(*Skin.limits("rows")[:2], "lines")
-    parser.add_argument("--rows", type=lines, metavar="N", help="Number of rows (default: the Skin's, or 16).")
-    parser.add_argument("--columns", type=lines, metavar="N", help="Number of columns (default: the Skin's, or 16).")
-    direction = "Direction of the diodes (default: the Skin's, or col2row)."
-    parser.add_argument("--diodes", choices=("col2row", "row2col"), help=direction)
+    flag("--rows N", "Number of rows (default: the Skin's, or 16).", lines)
+    flag("--columns N", "Number of columns (default: the Skin's, or 16).", lines)
+    flag("--diodes", "Direction of the diodes (default: the Skin's, or col2row).", ("col2row", "row2col"))
     usual = Circuit()
-    values = parser.add_argument_group("circuit")
+    values = flag.group("circuit")
     meanings = _meanings(Circuit)
     for name, (low, high, unit) in LIMITS.items():
-        flag = "--pf" if name == "line_pf" else _flag(name)
+        option = "--pf" if name == "line_pf" else _option(name)
         words = f"{meanings.get(name, '')} (default: {getattr(usual, name):g} {unit})."
-        kind = numbers.number(low, high, unit)
-        values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
-    diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
-    diode.add_argument("--diode", choices=tuple(DIODES), help="Kind; it gives the values below that you leave out.")
+        values(f"{option} {unit.upper()}", words, numbers.number(low, high, unit), dest=name)
+    diode = flag.group("diode, as SPICE describes it (default: schottky)")
+    diode("--diode", "Kind; it gives the values below that you leave out.", tuple(DIODES))
     meanings = _meanings(Diode)
     for one in dataclasses.fields(Diode):
         (low, high, *unit), spice = one.metadata["limits"], one.metadata["spice"]
-        kind = numbers.number(low, high, *unit)
         words = " ".join([f"{meanings.get(one.name, '')} (schottky: {getattr(usual.diode, one.name):g}", *unit]) + ")."
-        diode.add_argument(_flag(f"diode_{one.name}"), type=kind, metavar=spice, help=words)
-    factor = f"Recommended times are this many times those computed (default: {MARGIN:g})."
-    parser.add_argument("--margin", type=numbers.number(1, 10), default=MARGIN, metavar="FACTOR", help=factor)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+        diode(f"{_option(f'diode_{one.name}')} {spice}", words, numbers.number(low, high, *unit))
+    flag("--margin FACTOR", "Recommended times are this many times those computed.", numbers.number(1, 10), MARGIN)
+    flags.json(flag)
 
 
 def _meanings(kind: type) -> dict[str, str]:
@@ -54,7 +49,7 @@ def _meanings(kind: type) -> dict[str, str]:
     return {one.name: " ".join(one.text.split()).partition(". ")[0].rstrip(".") for one in helptext.fields(kind)}
 
 
-def _flag(name: str) -> str:
+def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
@@ -76,10 +71,7 @@ def run(args: argparse.Namespace) -> int:
     answer = _answer(values, needs, problems, args.margin) | asked
     if args.skin:
         answer["skin"] = _given(skin, sheet.recommended_us(skin, needs, args.margin))
-    if args.json:
-        print(json.dumps(answer, allow_nan=False))
-    else:
-        _show(answer, needs, args.margin)
+    results.show(args, answer, lambda: _show(answer, needs, args.margin))
     short = any(not one["enough"] for one in answer.get("skin", {}).values())
     return UNSOLVED if problems or short or None in answer.values() else 0
 
@@ -120,8 +112,8 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
             "row_peak": round(needs.row_peak_ma, 4),
             "column_peak": round(needs.column_peak_ma, 4),
         },
-        "problems": [dataclasses.asdict(problem) for problem in problems],
-        "circuit": dataclasses.asdict(circuit),
+        "problems": problems,
+        "circuit": circuit,
     }
 
 
@@ -164,7 +156,7 @@ def _show(answer: dict[str, Any], needs: Needs, margin: float) -> None:
         what = "enough" if one["enough"] else f"too short, {_or_never(one['needed'])} needed"
         terminal.say(f"the Skin's {name} = {one['given']:g}: {what}")
     for problem in answer["problems"]:
-        terminal.say(f"cannot work: {problem['what']}; {problem['helps']}", hang=2)
+        terminal.say(f"cannot work: {problem.what}; {problem.helps}", hang=2)
 
 
 def _or_never(us: float | None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import collections
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,28 +18,21 @@ from contactfpga.design.sheet.layout import MARGIN_MM
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shell_words
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    lay = "Skin to lay out, with its tables [circuit] and [cover]."
-    parser.add_argument("skin", metavar="SKIN.toml", nargs="?", help=lay)
-    flags.kit(parser)
-    flags.output_folder(parser, "build/sheet")
+def add_flags(flag: flags.Flags) -> None:
+    flag("[SKIN.toml]", "Skin to lay out, with its tables [circuit] and [cover].")
+    flags.kit(flag)
+    flags.output_folder(flag, "build/sheet")
     part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
-    parser.add_argument("--part", choices=tuple(SWITCHES), default="dome", help=part)
-    margin = f"Board beyond the parts, in mm (default: {MARGIN_MM:g})."
-    parser.add_argument(
-        "--edge-mm", type=numbers.number(MARGIN_MM, 100, "mm"), default=MARGIN_MM, metavar="MM", help=margin
-    )
-    cable = "Length of the ribbon cables, in m (default: 0.3)."
-    parser.add_argument("--cable", type=numbers.number(0, 10, "m"), default=0.3, metavar="M", help=cable)
-    parser.add_argument(
-        "--kicad", action="store_true", help="Have KiCad 6 check the board; status 1 if it finds anything."
-    )
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flag("--part", part, tuple(SWITCHES), "dome")
+    flag("--edge-mm MM", "Board beyond the parts, in mm.", numbers.number(MARGIN_MM, 100, "mm"), MARGIN_MM)
+    flag("--cable M", "Length of the ribbon cables, in m.", numbers.number(0, 10, "m"), 0.3)
+    flag("--kicad", "Have KiCad 6 check the board; status 1 if it finds anything.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,10 +71,7 @@ def run(args: argparse.Namespace) -> int:
         "extracted": {name: value for name, value in dataclasses.asdict(found).items() if name != "circuit"},
         "kicad": problems,
     }
-    if args.json:
-        print(json.dumps(answer))
-    else:
-        _show(answer, skin)
+    results.show(args, answer, lambda: _show(answer, skin))
     return 1 if problems else 0
 
 

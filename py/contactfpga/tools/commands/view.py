@@ -18,29 +18,24 @@ WHAT = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
+def add_flags(flag: flags.Flags) -> None:
     skin = "Skin of the virtual sheet; of a board: require one that was built from it, and use its baud rate."
-    flags.connection(parser, WHAT, skin)
-    parser.add_argument("--flat", action="store_true", help="A flat virtual sheet instead of one around a forearm.")
-    parser.add_argument(
-        "--link",
-        metavar="NAME",
-        help="Board to show from a recording of several (default: all of a robot, or the first).",
-    )
+    flags.connection(flag, WHAT, skin)
+    flag("--flat", "A flat virtual sheet instead of one around a forearm.")
+    flag("--link NAME", "Board to show from a recording of several (default: all of a robot, or the first).")
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
-    parser.add_argument("--units", metavar="FILE", help=units)
+    flag("--units FILE", units)
     model = "A robot in MuJoCo that wears the sheets of ROBOT.toml and is pushed with the mouse (docs/mujoco.md)."
-    parser.add_argument("--mujoco", metavar="MODEL.xml", help=model)
-    reflex = "Reflexes of that robot, which is Python code and runs, such as examples/arm/reflexes.py."
-    parser.add_argument("--reflex", metavar="FILE.py", help=reflex)
+    flag("--mujoco MODEL.xml", model)
+    flag("--reflex FILE.py", "Reflexes of that robot, which is Python code and runs, such as examples/arm/reflexes.py.")
     gateware = "Zones of that robot by the compiled gateware, slower than real time (default: by the golden model)."
-    parser.add_argument("--gateware", action="store_true", help=gateware)
+    flag("--gateware", gateware)
     host = "Address to listen on (default: 127.0.0.1, which only this computer can reach)."
-    parser.add_argument("--host", default="127.0.0.1", help=host)
+    flag("--host HOST", host, default="127.0.0.1")
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
-    parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)
-    parser.add_argument("--no-browser", action="store_true", help="Print the address only.")
-    flags.seconds(parser)
+    flag("--http-port N", port, numbers.whole(0, 65_535))
+    flag("--no-browser", "Print the address only.")
+    flags.seconds(flag)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,17 +19,14 @@ from contactfpga.zones.zone import Zones
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
-    flags.once(parser)
-    flags.seconds(parser)
-    parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
-    parser.add_argument(
-        "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
-    )
-    flags.forces(parser, "Show the force at each zone too")
-    record = "Write every byte received to this new file; replay://FILE plays it back."
-    parser.add_argument("--record", metavar="FILE", help=record)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
+    flags.once(flag)
+    flags.seconds(flag)
+    flags.json(flag, flags.FRAMES)
+    flag("--tracks", "Follow contacts: show ids that stay from frame to frame.")
+    flags.forces(flag, "Show the force at each zone too")
+    flag("--record FILE", "Write every byte received to this new file; replay://FILE plays it back.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
@@ -25,30 +26,87 @@ PORT = (
 SKIN = "Require a board built from this Skin, and use its baud rate."
 
 
-def connection(parser: argparse.ArgumentParser, port: str = PORT, skin: str = SKIN) -> None:
+class Flags:
+    """Adds flags to a command's parser, or to a group of its help, with a call for each."""
+
+    def __init__(self, parser: Any):
+        self.parser = parser
+
+    def group(self, title: str) -> Flags:
+        return Flags(self.parser.add_argument_group(title))
+
+    def one_of(self) -> Flags:
+        """Of the flags added to this, one must be given."""
+        return Flags(self.parser.add_mutually_exclusive_group(required=True))
+
+    def __call__(
+        self,
+        usage: str,
+        text: str,
+        kind: Callable[[str], object] | Sequence[object] | None = None,
+        default: object = None,
+        *,
+        required: bool = False,
+        dest: str | None = None,
+    ) -> None:
+        """Add a flag or an argument.
+
+        ``usage``: as ``--once``, ``-o --output FILE``, ``--rpy R P Y`` or ``--unit K=STEPS ...``, which can be
+        repeated; an argument as ``FILE``, ``[PORT]``, ``SCENES ...`` or ``[PORT ...]``. ``kind``: what reads the value,
+        as in :mod:`contactfpga.tools.console.numbers`, or the choices. The help ends with the default unless ``text``
+        states one. ``dest``: name of the value, by default that of the option, or of an argument up to its dot.
+        """
+        words = usage.strip("[]").split()
+        names = [word for word in words if word.startswith("-")]
+        values = [word for word in words if word not in (*names, "...")]
+        given: dict[str, Any] = {"help": _with_default(text, default), "required": required, "dest": dest}
+        if isinstance(kind, Sequence):
+            given |= {"choices": kind, "type": type(kind[0])}
+        else:
+            given |= {"type": kind, "metavar": values[0] if len(values) == 1 else tuple(values) or None}
+        given["default"] = default
+        if not names:
+            given["nargs"] = {"[": "*" if "..." in words else "?"}.get(usage[0], "+" if "..." in words else None)
+            names = [given.pop("dest") or values[0].partition(".")[0].lower()]
+            del given["required"]
+        elif not values and kind is None:
+            given = {"help": text, "action": "store_true"}
+        elif "..." in words:
+            given["action"] = "append"
+        elif len(values) > 1:
+            given["nargs"] = len(values)
+        self.parser.add_argument(*names, **{name: value for name, value in given.items() if value is not None})
+
+
+def _with_default(text: str, default: object) -> str:
+    if default in (None, "", []) or "(default: " in text:
+        return text
+    values = default if isinstance(default, tuple) else (default,)
+    shown = " ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in values)
+    return f"{text.removesuffix('.')} (default: {shown})."
+
+
+def connection(flag: Flags, port: str = PORT, skin: str = SKIN) -> None:
     """Add the flags of :func:`opened`; ``port``, ``skin``: their help."""
-    parser.add_argument("port", nargs="?", metavar="PORT", help=port)
-    reading(parser, skin)
+    flag("[PORT]", port)
+    reading(flag, skin)
 
 
-def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
+def reading(flag: Flags, skin: str = SKIN) -> None:
     """Add the flags for opening a port; ``skin``: help of this option."""
-    parser.add_argument("--skin", metavar="FILE", help=skin)
-    parser.add_argument(
-        "--baud", type=numbers.BAUD, metavar="N", help="Bits per second (default: the Skin's, or 3000000)."
-    )
-    wait = "Seconds to wait for the board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+    flag("--skin FILE", skin)
+    flag("--baud N", "Bits per second (default: the Skin's, or 3000000).", numbers.BAUD)
+    flag("--timeout S", "Seconds to wait for the board.", numbers.SECONDS, 1.0)
 
 
-def sheet(parser: argparse.ArgumentParser, skin: str) -> None:
+def sheet(flag: Flags, skin: str) -> None:
     """Add a Skin's file or a kit's name; ``skin``: help of the former."""
-    parser.add_argument("--skin", metavar="FILE", help=skin)
-    kit(parser)
+    flag("--skin FILE", skin)
+    kit(flag)
 
 
-def kit(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--kit", metavar="NAME", help="The sheet of this kit (docs/kits.md).")
+def kit(flag: Flags) -> None:
+    flag("--kit NAME", "The sheet of this kit (docs/kits.md).")
 
 
 def sheet_file(args: argparse.Namespace) -> str | None:
@@ -82,10 +140,10 @@ def named_board(args: argparse.Namespace) -> BoardSpec:
     return found
 
 
-def design(parser: argparse.ArgumentParser, skin: str) -> None:
+def design(flag: Flags, skin: str) -> None:
     """Add one Skin, a kit's or several; ``skin``: help of the first option."""
-    sheet(parser, skin)
-    parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
+    sheet(flag, skin)
+    flag("--sheets FILE", "Several sheets at this one FPGA (docs/several.md).")
 
 
 def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] = Skin.load) -> Skin | Several:
@@ -98,17 +156,14 @@ def designed(args: argparse.Namespace, usual: Skin, load: Callable[[str], Skin] 
     return load(args.skin) if args.skin else usual
 
 
-def seconds(parser: argparse.ArgumentParser) -> None:
+def seconds(flag: Flags) -> None:
     """Add the duration of commands that run until Ctrl-C."""
-    long = "End after this many seconds (default: at Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
+    flag("--seconds S", "End after this many seconds (default: at Ctrl-C).", numbers.SECONDS)
 
 
-def forces(parser: argparse.ArgumentParser, what: str) -> None:
-    units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
-    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+def forces(flag: Flags, what: str) -> None:
+    flag("--units FILE", f"{what}, from the board's pressure units in this TOML file (docs/haptics.md).")
+    flag("--friction MU", "Friction coefficient of what touches (default: 0.5); needs --units.", numbers.number(0, 10))
 
 
 def check_forces(args: argparse.Namespace) -> None:
@@ -117,8 +172,8 @@ def check_forces(args: argparse.Namespace) -> None:
         raise ContactFPGAError("--friction needs --units: it is used for forces only")
 
 
-def once(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--once", action="store_true", help="Ask for one frame, show it, and exit.")
+def once(flag: Flags) -> None:
+    flag("--once", "Ask for one frame, show it, and exit.")
 
 
 def opened(args: argparse.Namespace, record: str | None = None) -> Board:
@@ -134,18 +189,26 @@ def known_skin(board: Board) -> Skin | None:
         return None
 
 
-def workers(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
-    dask = "Send the work to the Dask cluster with this scheduler."
-    parser.add_argument("--dask", metavar="ADDRESS", help=dask)
+SI = "Print one JSON object in SI units."
+FRAMES = "Print every frame as a line with one JSON object."
 
 
-def output(parser: argparse.ArgumentParser, text: str, metavar: str = "FILE", default: str | None = None) -> None:
-    parser.add_argument("-o", "--output", metavar=metavar, default=default, help=text)
+def json(flag: Flags, text: str = "Print one JSON object.") -> None:
+    """Add the flag of :func:`contactfpga.tools.console.results.show`."""
+    flag("--json", text)
 
 
-def output_folder(parser: argparse.ArgumentParser, default: str) -> None:
-    output(parser, f"Folder for the results (default: {default}).", "DIR", default)
+def workers(flag: Flags) -> None:
+    flag("--jobs N", "Number of processes (default: one per core).", numbers.JOBS)
+    flag("--dask ADDRESS", "Send the work to the Dask cluster with this scheduler.")
+
+
+def output(flag: Flags, text: str, metavar: str = "FILE", default: str | None = None) -> None:
+    flag(f"-o --output {metavar}", text, default=default)
+
+
+def output_folder(flag: Flags, default: str) -> None:
+    output(flag, "Folder for the results.", "DIR", default)
 
 
 def known(option: str, names: list[str] | None, choices: list[str]) -> list[str]:

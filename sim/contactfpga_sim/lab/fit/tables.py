@@ -7,6 +7,7 @@ import shlex
 import sys
 
 from contactfpga.tools.commands.fit import add_flags, asked
+from contactfpga.tools.console.flags import Flags
 from contactfpga_sim.lab import pool, writer
 from contactfpga_sim.lab.fit import show
 from contactfpga_sim.lab.fit.search import fit
@@ -17,7 +18,7 @@ def section(arguments: str) -> str:
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
-    add_flags(parser)
+    add_flags(Flags(parser))
     task, tried = asked(parser.parse_args(shlex.split(arguments)))
     with pool.executor(None, None) as executor, pool.progress() as step:
         found = fit(task, tried, executor, step)

@@ -6,7 +6,7 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -16,22 +16,22 @@ from contactfpga.robot.body import Body, folds
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.tools.commands.body.register import link
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.zones.zone import Zones
 
 EXTRA = None
 MAX_LINE = 200
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
-    parser.add_argument("link", metavar="LINK", help="Name of the link whose sheet folds.")
-    parser.add_argument("joint", metavar="JOINT", help="Name of the joint that folds it.")
-    output = "File to write; robot.toml names it as the link's folds."
-    parser.add_argument("output", metavar="FOLDS.json", help=output)
-    step = f"Width of a step of the angle; folds are learned per step (default: {folds.STEP_RAD:g})."
-    parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
-    parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
+    flag("LINK", "Name of the link whose sheet folds.")
+    flag("JOINT", "Name of the joint that folds it.")
+    flag("FOLDS.json", "File to write; robot.toml names it as the link's folds.", dest="output")
+    step = "Width of a step of the angle; folds are learned per step."
+    flag("--step RAD", step, numbers.number(1e-4, 1, "rad"), folds.STEP_RAD)
+    flags.json(flag)
+    flag.parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,19 +48,31 @@ def run(args: argparse.Namespace) -> int:
     if not found.frames:
         raise ValueError("no angle came on standard input; let the robot write one per line")
     found.save(output)
-    low, high = min(found.frames) * found.step_rad, (max(found.frames) + 1) * found.step_rad
-    cells = np.any(list(found.cells.values()), axis=0).sum()
-    gaps = max(found.frames) - min(found.frames) + 1 - len(found.frames)
+    first, last = min(found.frames), max(found.frames)
+    answer = {
+        "file": output,
+        "frames": sum(found.frames.values()),
+        "from_rad": first * found.step_rad,
+        "to_rad": (last + 1) * found.step_rad,
+        "cells": np.any(list(found.cells.values()), axis=0).sum(),
+        "steps": len(found.frames),
+        "steps_pressed": sum(bool(one.any()) for one in found.cells.values()),
+        "steps_missed": last - first + 1 - len(found.frames),
+    }
+    results.show(args, answer, lambda: _show(answer))
+    return 0
+
+
+def _show(answer: dict[str, Any]) -> None:
+    steps, missed = answer["steps"], answer["steps_missed"]
     terminal.say(
-        f"{output}: {sum(found.frames.values())} frames from {low:.2f} to {high:.2f} rad, {cells} cells "
-        f"pressed somewhere, at {sum(one.any() for one in found.cells.values())} of {len(found.frames)} steps",
+        f"{answer['file']}: {answer['frames']} frames from {answer['from_rad']:.2f} to {answer['to_rad']:.2f} rad, "
+        f"{answer['cells']} cells pressed somewhere, at {answer['steps_pressed']} of {steps} steps",
         hang=2,
     )
-    if gaps:
-        between = max(found.frames) - min(found.frames) - 1
-        missed = f"no frame came at {gaps} of the {between} steps between"
-        terminal.say(f"{missed}: move more slowly, or folds there are not marked", hang=2)
-    return 0
+    if missed:
+        missing = f"no frame came at {missed} of the {steps + missed - 2} steps between"
+        terminal.say(f"{missing}: move more slowly, or folds there are not marked", hang=2)
 
 
 def _check(body: Body, plan: Plan, joint: str) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import math
+import sys
 
 from contactfpga import terminal
 from contactfpga.driver import driver
@@ -14,19 +14,18 @@ from contactfpga.inputs.values import shown
 from contactfpga.robot.body import Body, registration
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.registration import Press, Registration
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
-    parser.add_argument("link", metavar="LINK", help="Name of the link.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
+    flag("LINK", "Name of the link.")
     points = "Known points on the link, a [[point]] with point_m each; you press those without pressed_mm when asked."
-    parser.add_argument("points", metavar="POINTS.toml", help=points)
-    wait = "Seconds to wait for each press (default: 60)."
-    parser.add_argument("--wait", type=numbers.SECONDS, default=60.0, metavar="S", help=wait)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+    flag("POINTS.toml", points)
+    flag("--wait S", "Seconds to wait for each press.", numbers.SECONDS, 60.0)
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -34,12 +33,9 @@ def run(args: argparse.Namespace) -> int:
     presses = registration.load(args.points)
     if any(press.pressed_mm is None for press in presses):
         with driver.open(plan.port, plan.skin) as board:
-            presses = [_pressed(board, plan, number, press, args.wait) for number, press in enumerate(presses, 1)]
+            presses = [_pressed(board, plan, number, press, args) for number, press in enumerate(presses, 1)]
     found = registration.register(plan, presses)
-    if args.json:
-        print(json.dumps(_values(found)))
-    else:
-        _show(found, plan)
+    results.show(args, _values(found), lambda: _show(found, plan))
     return 0
 
 
@@ -49,23 +45,24 @@ def link(body: Body, name: str) -> Plan:
     return body.links[name]
 
 
-def _pressed(board: Board, plan: Plan, number: int, press: Press, wait_s: float) -> Press:
+def _pressed(board: Board, plan: Plan, number: int, press: Press, args: argparse.Namespace) -> Press:
     if press.pressed_mm is not None:
         return press
     x, y, z = (f"{1e3 * value:.1f}" for value in press.point_m)
-    terminal.say(f"press point {number}, ({x}, {y}, {z}) mm, and nothing else")
-    until = board.clock() + wait_s
+    asks = sys.stderr if args.json else None
+    terminal.say(f"press point {number}, ({x}, {y}, {z}) mm, and nothing else", asks)
+    until = board.clock() + args.wait
     frames = board.subscribe(maxsize=4096)
 
     def coming():  # type: ignore[no-untyped-def]
         for zones in frames:
             if board.clock() > until:
-                raise ValueError(f"point {number} was not pressed within {wait_s:g} s, or not by a single zone")
+                raise ValueError(f"point {number} was not pressed within {args.wait:g} s, or not by a single zone")
             yield zones
 
     with frames:
         place = registration.held(coming(), max(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm))
-        terminal.say(f"  zone at x {place[0]:.2f} mm, y {place[1]:.2f} mm; let go", hang=2)
+        terminal.say(f"  zone at x {place[0]:.2f} mm, y {place[1]:.2f} mm; let go", asks, hang=2)
         for zones in coming():
             if not len(zones):
                 break
@@ -75,8 +72,8 @@ def _pressed(board: Board, plan: Plan, number: int, press: Press, wait_s: float)
 def _values(found: Registration) -> dict[str, object]:
     values = {field.name: getattr(found, field.name) for field in dataclasses.fields(found) if field.name != "pose"}
     return {
-        "point_m": found.pose.point_m.tolist(),
-        "rpy_rad": list(found.pose.rpy_rad),
+        "point_m": found.pose.point_m,
+        "rpy_rad": found.pose.rpy_rad,
         "rms_mm": found.rms_mm,
     } | values
 

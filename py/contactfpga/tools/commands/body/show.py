@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
+from collections.abc import Sequence
 
 from contactfpga import terminal
 from contactfpga.inputs.values import number_in
 from contactfpga.robot.body import Body, LinkContact, Snapshot
 from contactfpga.robot.body.snapshot import BASE, LINK
-from contactfpga.tools.console import numbers
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
@@ -19,17 +19,15 @@ READINGS_S = 0.03
 """Delay of a frame's pressure unit readings."""
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("ROBOT.toml", "The robot's links; docs/body.md has the format.")
     frame = "Frame of the contacts: base, or link for each link's own (default: base, or link without a URDF)."
-    parser.add_argument("--frame", choices=(BASE, LINK), help=frame)
+    flag("--frame", frame, (BASE, LINK))
     joint = "Angle of a joint in rad, or m of one that slides; may be repeated (default: 0)."
-    parser.add_argument("--joint", action="append", default=[], type=angle, metavar="NAME=RAD", help=joint)
-    seconds = "Print the state every second, for this long (default: once)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
-    parser.add_argument("--json", action="store_true", help="Print a line with one JSON object each time.")
-    wait = "Seconds to wait for each board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+    flag("--joint NAME=RAD ...", joint, angle, [])
+    flag("--seconds S", "Print the state every second, for this long (default: once).", numbers.SECONDS)
+    flags.json(flag, "Print a line with one JSON object each time.")
+    flag("--timeout S", "Seconds to wait for each board.", numbers.SECONDS, 1.0)
 
 
 def angle(text: str) -> tuple[str, float]:
@@ -52,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             snapshot = opened.read(args.timeout)
             if any(plan.units is not None for plan in body.links.values()):
                 time.sleep(READINGS_S)
-            _print(snapshot, frame, args.json)
+            _print(snapshot, frame, args)
             left = until - time.monotonic()
             if left <= 0:
                 return 0 if len(snapshot.answering) == len(snapshot.links) else 1
@@ -67,16 +65,16 @@ def _angles(body: Body, given: dict[str, float]) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | given
 
 
-def _print(snapshot: Snapshot, frame: str, as_json: bool) -> None:
+def _print(snapshot: Snapshot, frame: str, args: argparse.Namespace) -> None:
     contacts = snapshot.contacts(frame, links=snapshot.answering)
-    if as_json:
-        links = {
-            name: {"status": one.status, "age_s": one.age_s, "reason": one.reason}
-            for name, one in snapshot.links.items()
-        }
-        found = [one.to_dict() for one in contacts]
-        print(json.dumps({"host_time_s": snapshot.host_time_s, "links": links, "contacts": found}), flush=True)
-        return
+    links = {
+        name: {"status": one.status, "age_s": one.age_s, "reason": one.reason} for name, one in snapshot.links.items()
+    }
+    answer = {"host_time_s": snapshot.host_time_s, "links": links, "contacts": contacts}
+    results.show(args, answer, lambda: _show(snapshot, contacts))
+
+
+def _show(snapshot: Snapshot, contacts: Sequence[LinkContact]) -> None:
     for name, state in snapshot.links.items():
         mine = [one for one in contacts if one.link == name]
         what = f"{len(mine)} contact{'' if len(mine) == 1 else 's'}" if state.status == "ok" else "contacts not known"

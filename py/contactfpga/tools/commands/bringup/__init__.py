@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import datetime
-import json
 import math
 import re
 import statistics
@@ -31,7 +30,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup import steps
 from contactfpga.tools.commands.bringup.bench import Bench, Person, Step
 from contactfpga.tools.commands.bringup.report import BringUpReport, graded
-from contactfpga.tools.console import flags, interrupt, numbers, outputs
+from contactfpga.tools.console import flags, interrupt, numbers, outputs, results
 
 EXTRA = None
 
@@ -47,23 +46,20 @@ REHEARSED_S, REHEARSED_LINK_S = 5.0, 0.15
 """Simulated times in s: longest constant action of the hand, and counting."""
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    port = (
-        "As for other commands; sim:// rehearses on a virtual board (default: the supported board that is plugged in)."
-    )
-    parser.add_argument("port", nargs="?", metavar="PORT", help=port)
-    flags.kit(parser)
+def add_flags(flag: flags.Flags) -> None:
+    port = "As for other commands; sim:// rehearses on a virtual board"
+    flag("[PORT]", f"{port} (default: the supported board that is plugged in).")
+    flags.kit(flag)
     own = "Write the Skin that bring-up needs to this new file and end: the kit's, but it sends every cell."
-    parser.add_argument("--skin-output", metavar="FILE", help=own)
-    flags.output(parser, "The report (default: bringup-NAME-DATE.md).")
+    flag("--skin-output FILE", own)
+    flags.output(flag, "The report (default: bringup-NAME-DATE.md).")
     long = f"Seconds that each step with a touch lasts at most (default: {SECONDS:g}); Ctrl-C ends such a step."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
-    wait = "Seconds to wait for the board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
-    parser.add_argument("--yes", action="store_true", help="Do not wait for Enter before each step.")
+    flag("--seconds S", long, numbers.SECONDS)
+    flag("--timeout S", "Seconds to wait for the board.", numbers.SECONDS, 1.0)
+    flag("--yes", "Do not wait for Enter before each step.")
     yours = "What you measured yourself of the kit's predictions, by scale, scope or meter; may be given several times."
-    parser.add_argument("--measured", action="append", type=_measured, default=[], metavar="NAME=VALUE", help=yours)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object at the end, and nothing before it.")
+    flag("--measured NAME=VALUE ...", yours, _measured, [])
+    flags.json(flag, "Print one JSON object at the end, and nothing before it.")
 
 
 def _measured(text: str) -> tuple[str, float]:
@@ -93,10 +89,7 @@ def run(args: argparse.Namespace) -> int:
     report.grades = graded(predicted, measured)
     report.not_measured = [one for name, one in predicted.items() if name not in measured]
     write_text(path, report.to_markdown())
-    if args.json:
-        print(json.dumps(report.to_dict()), flush=True)
-    else:
-        _show_end(report, str(path))
+    results.show(args, report, lambda: _show_end(report, str(path)))
     return min(report.faults, 1)
 
 

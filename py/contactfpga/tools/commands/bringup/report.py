@@ -73,7 +73,7 @@ class BringUpReport:
             "steps": [
                 {
                     "name": step.name,
-                    "findings": [finding._asdict() for finding in step.findings],
+                    "findings": step.findings,
                     "measured": step.measured,
                     "stop": step.stop,
                 }

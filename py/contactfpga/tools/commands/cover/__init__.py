@@ -5,15 +5,10 @@ Input and JSON are in SI units, tables in mm and kPa.
 
 from __future__ import annotations
 
-import argparse
-import dataclasses
-import json
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
 
-from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, NoSolution
-from contactfpga.errors import UNSOLVED
+from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError
 from contactfpga.tools.console import numbers
 
 TOPICS = {
@@ -37,37 +32,9 @@ def run(topic: Callable[[], int]) -> int:
 MM, KPA = 1e3, 1e-3
 
 
-def say(known: dict[str, Any]) -> int:
-    print(json.dumps(known, default=_plain, allow_nan=False))
-    return 0
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, NoSolution):
-        return {"no_solution": value.reason}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return dataclasses.asdict(value)
-    raise TypeError(f"{value!r} is no JSON")
-
-
-def unsolved(answer: NoSolution, as_json: bool) -> int:
-    if as_json:
-        say({"no_solution": answer.reason})
-    else:
-        print(answer)
-    return UNSOLVED
-
-
-def table(*lines: tuple[str, str]) -> None:
-    wide = max(len(title) for title, _ in lines)
-    for title, value in lines:
-        print(f"{title:{wide}}  {value}")
-
-
-def notes(found: list[str]) -> int:
+def notes(found: Iterable[str]) -> None:
     for note in found:
         print(f"note: {note}")
-    return 0
 
 
 LENGTH, LENGTH_FROM_0 = numbers.length(MAX_LENGTH_M), numbers.length(MAX_LENGTH_M, 0.0)
@@ -82,7 +49,3 @@ ANGLE = numbers.number(-2 * math.pi, 2 * math.pi, "rad")
 POISSON = numbers.number(-1, 0.5, above=True)
 PASCAL = numbers.number(1, 1e12, "Pa")
 NEWTON = numbers.number(1e-6, 1e6, "N")
-
-
-def json_flag(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")

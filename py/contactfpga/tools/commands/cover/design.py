@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import math
 from typing import Any
 
@@ -13,8 +12,8 @@ from contactfpga.design.cover.region import RegionLimits
 from contactfpga.design.cover.sense import Sense
 from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
-from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import KPA, MM, notes, say, table
+from contactfpga.tools.commands.cover import KPA, MM, notes
+from contactfpga.tools.console import flags, results
 
 EXTRA = "sim"
 
@@ -40,16 +39,18 @@ THIN_HEADS = (
 )
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.toml", help="Arm, impact, switch and limits; see examples/.")
-    cover.json_flag(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.toml", "Arm, impact, switch and limits; see examples/.")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
     found = design(Task.load(args.file))
-    status = 0 if found.best else UNSOLVED
-    if args.json:
-        return say(_plain(found)) or status
+    results.show(args, _plain(found), lambda: _show(found))
+    return 0 if found.best else UNSOLVED
+
+
+def _show(found: Design) -> None:
     columns([HEADS, *(_row(one) for one in found.candidates)])
     print()
     first = found.candidates[0]
@@ -58,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         assert first.pitch_m is not None
         assert first.binding is not None
         force = first.sure.value if first.sure else None
-        table(
+        results.table(
             ("fits", first.foam.name),
             ("thickness", f"{MM * first.thickness_m:.4g} mm"),
             ("pitch", f"{MM * first.pitch_m:.4g} mm"),
@@ -70,14 +71,13 @@ def run(args: argparse.Namespace) -> int:
         print(f"nothing fits; nearest is {first.foam.name}. It would take:")
         for one in found.relax:
             print(f"  {one}")
-    notes(list(first.notes))
+    notes(first.notes)
     if first.regions:
         print()
         columns([REGION_HEADS, *map(region_row, first.regions)])
     print()
     columns([THIN_HEADS, *(_thin_row(one) for one in found.thinning)])
     print(f"the sheet itself: {MM * found.sheet_s:.4g} ms at worst from touch to last byte")
-    return status
 
 
 def _row(one: FoamDesign) -> tuple[str, ...]:
@@ -150,9 +150,9 @@ def _plain(found: Design) -> dict[str, Any]:
     return {
         "fits": found.best is not None,
         "best": None if found.best is None else _candidate(found.best),
-        "relax": list(found.relax),
+        "relax": found.relax,
         "candidates": [_candidate(one) for one in found.candidates],
-        "thinning": [dataclasses.asdict(one) for one in found.thinning],
+        "thinning": found.thinning,
         "sheet_s": found.sheet_s,
     }
 
@@ -182,7 +182,7 @@ def _candidate(one: FoamDesign) -> dict[str, Any]:
             for check in one.checks
         ],
         "no_solution": one.no_solution,
-        "notes": list(one.notes),
+        "notes": one.notes,
     }
 
 

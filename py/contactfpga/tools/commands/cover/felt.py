@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 
 from contactfpga.design import kits
 from contactfpga.design.cover import felt as touches
@@ -13,34 +12,30 @@ from contactfpga.design.cover.press import Cover, load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import MM, say, table
-from contactfpga.tools.console import flags, numbers
+from contactfpga.tools.commands.cover import MM
+from contactfpga.tools.console import flags, numbers, results
 
 EXTRA = None
 
 M = 1e-3
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("skin", metavar="SKIN", nargs="?", help="TOML file of a Skin with a table [cover].")
-    flags.kit(parser)
-    finger = parser.add_argument_group("finger, an ellipse whose size does not depend on its force")
-    for name, usual in (("--length", touches.LENGTH_M), ("--width", touches.WIDTH_M)):
-        side = f"Its {name.strip('-')} (default: {usual:g})."
-        finger.add_argument(name, type=cover.LENGTH, default=usual, metavar="M", help=side)
-    places = f"Places of it, spread evenly over the sheet (default: {touches.PLACES})."
-    whole = numbers.whole(1, touches.MOST_PLACES)
-    finger.add_argument("--places", type=whole, default=touches.PLACES, metavar="N", help=places)
-    rest = parser.add_argument_group("what presses though nothing touches")
-    link = "The link's own acceleration toward the outside of the sheet (default: 0)."
-    rest.add_argument("--acceleration", type=numbers.number(0, 1e4, "m/s2"), default=0.0, metavar="M/S2", help=link)
-    density = "Density of the foam, which the acceleration presses on the switches (default: 0)."
-    rest.add_argument(
-        "--foam-density", type=numbers.number(0, 1e4, "kg/m3"), default=0.0, metavar="KG/M3", help=density
-    )
-    seed = "Of the closing forces that are drawn where the switch has a spread (default: 0)."
-    parser.add_argument("--seed", type=numbers.whole(0, 2**32 - 1), default=0, metavar="N", help=seed)
-    cover.json_flag(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flag("[SKIN]", "TOML file of a Skin with a table [cover].")
+    flags.kit(flag)
+    finger = flag.group("finger, an ellipse whose size does not depend on its force")
+    finger("--length M", "Its length.", cover.LENGTH, touches.LENGTH_M)
+    finger("--width M", "Its width.", cover.LENGTH, touches.WIDTH_M)
+    places = "Places of it, spread evenly over the sheet."
+    finger("--places N", places, numbers.whole(1, touches.MOST_PLACES), touches.PLACES)
+    rest = flag.group("what presses though nothing touches")
+    link = "The link's own acceleration toward the outside of the sheet."
+    rest("--acceleration M/S2", link, numbers.number(0, 1e4, "m/s2"), 0.0)
+    density = "Density of the foam, which the acceleration presses on the switches."
+    rest("--foam-density KG/M3", density, numbers.number(0, 1e4, "kg/m3"), 0.0)
+    seed = "Of the closing forces that are drawn where the switch has a spread."
+    flag("--seed N", seed, numbers.whole(0, 2**32 - 1), 0)
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,12 +53,8 @@ def run(args: argparse.Namespace) -> int:
         *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed)
     )
     unsolved = any(isinstance(force, NoSolution) for force in (found.half, found.most, found.worst))
-    if args.json:
-        finger = {"length_m": args.length, "width_m": args.width}
-        names = (field.name for field in dataclasses.fields(Felt))
-        say({"finger": finger} | {name: getattr(found, name) for name in names})
-    else:
-        _print(found, laid, args)
+    answer = {"finger": {"length_m": args.length, "width_m": args.width}} | vars(found)
+    results.show(args, answer, lambda: _print(found, laid, args))
     return UNSOLVED if unsolved else 0
 
 
@@ -77,7 +68,7 @@ def _print(found: Felt, laid: Cover, args: argparse.Namespace) -> None:
     forces = f"{laid.switch.force_n:g} N"
     if found.sheets > 1:
         forces += f", {100 * laid.switch.spread:g} % spread; 95 % of {found.sheets} drawn sheets in parentheses"
-    table(
+    results.table(
         ("finger", f"{size}, at {found.places} places and angles"),
         ("a switch closes at", forces),
         ("50 % of touches felt from", _force(found.half)),

@@ -10,44 +10,37 @@ from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import METHODS, Impact
+from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import KPA, MM, notes, say, table, unsolved
+from contactfpga.tools.commands.cover import KPA, MM, notes
+from contactfpga.tools.console import flags, results
 
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    arm = parser.add_argument_group("arm")
-    arm.add_argument("--mass", type=cover.KG, required=True, metavar="KG", help="Mass of the link.")
-    arm.add_argument("--radius", type=cover.LENGTH, required=True, metavar="M", help="Radius of the link, a cylinder.")
-    com = "Distance from the joint to the center of mass."
-    arm.add_argument("--com", type=cover.ALONG, required=True, metavar="M", help=com)
-    lever = "Distance from the joint to the contact."
-    arm.add_argument("--lever", type=cover.ALONG, required=True, metavar="M", help=lever)
-    arm.add_argument("--length", type=cover.ALONG, metavar="M", help="Length of the link (default: the lever).")
-    arm.add_argument("--tube", action="store_true", help="Take the link for a thin tube.")
-    speed = "Speed of the contact point at the touch."
-    arm.add_argument("--speed", type=cover.SPEED, required=True, metavar="M/S", help=speed)
-    torque = "Constant torque of the motor (default: 0)."
-    arm.add_argument("--torque", type=cover.TORQUE, default=0.0, metavar="NM", help=torque)
-    arm.add_argument("--gravity", action="store_true", help="Include gravity, 9.81 m/s2.")
-    angle = "Angle of the joint; at 0 the link hangs down (default: 0)."
-    arm.add_argument("--angle", type=cover.ANGLE, default=0.0, metavar="RAD", help=angle)
-    foam = parser.add_argument_group("foam")
-    wanted = foam.add_mutually_exclusive_group(required=True)
-    wanted.add_argument("--modulus", type=cover.PASCAL, metavar="PA", help="Young's modulus.")
-    time = "Compression time for which the modulus is sought."
-    wanted.add_argument("--time", type=cover.BRIEF, metavar="S", help=time)
-    foam.add_argument("--poisson", type=cover.POISSON, default=0.5, help="Poisson's ratio (default: 0.5).")
-    both = "R* with 1/R* = 1/R + 1/R'."
-    foam.add_argument("--effective-radius", type=cover.LENGTH, required=True, metavar="M", help=both)
-    flat = "Thickness; refuse an impact that presses the foam flat."
-    foam.add_argument("--thickness", type=cover.LENGTH, metavar="M", help=flat)
+def add_flags(flag: flags.Flags) -> None:
+    arm = flag.group("arm")
+    arm("--mass KG", "Mass of the link.", cover.KG, required=True)
+    arm("--radius M", "Radius of the link, a cylinder.", cover.LENGTH, required=True)
+    arm("--com M", "Distance from the joint to the center of mass.", cover.ALONG, required=True)
+    arm("--lever M", "Distance from the joint to the contact.", cover.ALONG, required=True)
+    arm("--length M", "Length of the link (default: the lever).", cover.ALONG)
+    arm("--tube", "Take the link for a thin tube.")
+    arm("--speed M/S", "Speed of the contact point at the touch.", cover.SPEED, required=True)
+    arm("--torque NM", "Constant torque of the motor.", cover.TORQUE, 0.0)
+    arm("--gravity", "Include gravity, 9.81 m/s2.")
+    arm("--angle RAD", "Angle of the joint; at 0 the link hangs down.", cover.ANGLE, 0.0)
+    foam = flag.group("foam")
+    wanted = foam.one_of()
+    wanted("--modulus PA", "Young's modulus.", cover.PASCAL)
+    wanted("--time S", "Compression time for which the modulus is sought.", cover.BRIEF)
+    foam("--poisson POISSON", "Poisson's ratio.", cover.POISSON, 0.5)
+    foam("--effective-radius M", "R* with 1/R* = 1/R + 1/R'.", cover.LENGTH, required=True)
+    foam("--thickness M", "Thickness; refuse an impact that presses the foam flat.", cover.LENGTH)
     strength = "Yield strength; refuse an impact from which the foam does not spring back."
-    foam.add_argument("--yield-strength", type=cover.PASCAL, metavar="PA", help=strength)
-    method = "How the equation of motion is solved (default: auto)."
-    parser.add_argument("--solver", choices=METHODS, default="auto", help=method)
-    cover.json_flag(parser)
+    foam("--yield-strength PA", strength, cover.PASCAL)
+    flag("--solver", "How the equation of motion is solved.", METHODS, "auto")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
     )
     answer = _struck(args, arm)
     if isinstance(answer, NoSolution):
-        return unsolved(answer, args.json)
+        results.show(args, answer, lambda: print(answer))
+        return UNSOLVED
     ball = elastic.ball_of(answer.stiffness, args.effective_radius)
     known: dict[str, Any] = {
         "compression_m": answer.compression_m,
@@ -80,20 +74,23 @@ def run(args: argparse.Namespace) -> int:
         "method": answer.method,
         "notes": [*answer.notes, *_hertz_notes(args.thickness, ball, answer.force_n)],
     }
-    if args.json:
-        return say(known)
-    table(
-        ("compression", f"{MM * answer.compression_m:.4g} mm"),
-        ("compression time", f"{MM * answer.time_s:.5g} ms"),
-        ("peak force", f"{answer.force_n:.4g} N"),
+    results.show(args, known, lambda: _show(known))
+    return 0
+
+
+def _show(known: dict[str, Any]) -> None:
+    results.table(
+        ("compression", f"{MM * known['compression_m']:.4g} mm"),
+        ("compression time", f"{MM * known['time_s']:.5g} ms"),
+        ("peak force", f"{known['force_n']:.4g} N"),
         ("radius of the patch then", f"{MM * known['patch_m']:.4g} mm"),
-        ("stiffness K_s", f"{answer.stiffness:.6g} N/m^1.5"),
+        ("stiffness K_s", f"{known['stiffness']:.6g} N/m^1.5"),
         ("Young's modulus", f"{KPA * known['modulus_pa']:.5g} kPa"),
-        ("effective modulus E*", f"{KPA * ball.modulus_pa:.5g} kPa"),
-        ("inertia", f"{arm.inertia_kgm2:.6g} kg m2"),
-        ("method", answer.method),
+        ("effective modulus E*", f"{KPA * known['effective_modulus_pa']:.5g} kPa"),
+        ("inertia", f"{known['inertia_kgm2']:.6g} kg m2"),
+        ("method", known["method"]),
     )
-    return notes(known["notes"])
+    notes(known["notes"])
 
 
 def _struck(args: argparse.Namespace, arm: Arm) -> Impact | NoSolution:

@@ -12,36 +12,33 @@ from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, PaddedSheet, Sense
 from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands import cover
-from contactfpga.tools.commands.cover import MM, notes, say, table
+from contactfpga.tools.commands.cover import MM, notes
+from contactfpga.tools.console import flags, results
 
 EXTRA = "sim"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    asked = parser.add_argument_group("what is asked")
-    offset = "Distance from the contact to the switch: find the force."
-    asked.add_argument("--offset", type=cover.LENGTH_FROM_0, metavar="M", help=offset)
-    asked.add_argument("--force", type=cover.NEWTON, metavar="N", help="Force: find its reach and the pitch.")
-    pitch = "Pitch of a square sheet: find its smallest force."
-    asked.add_argument("--pitch", type=cover.LENGTH, metavar="M", help=pitch)
-    thickness = "Thickness of the cover; without it, find the best one."
-    asked.add_argument("--thickness", type=cover.LENGTH, metavar="M", help=thickness)
-    switch, usual = parser.add_argument_group("switch"), Switch()
-    closing = f"Force that closes the switch (default: {usual.force_n:g})."
-    switch.add_argument("--switch-force", type=cover.NEWTON, default=usual.force_n, metavar="N", help=closing)
-    face = f"Area of its face (default: {usual.area_m2:g})."
-    switch.add_argument("--switch-area", type=cover.FACE, default=usual.area_m2, metavar="M2", help=face)
-    ball = parser.add_argument_group("what touches, if known")
-    ball.add_argument("--modulus", type=cover.PASCAL, metavar="PA", help="Young's modulus of the cover.")
-    ball.add_argument("--poisson", type=cover.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5).")
-    ball.add_argument("--effective-radius", type=cover.LENGTH, metavar="M", help="R* with 1/R* = 1/R + 1/R'.")
-    model = parser.add_argument_group("model (default: the simplest within the tolerance)")
+def add_flags(flag: flags.Flags) -> None:
+    asked = flag.group("what is asked")
+    asked("--offset M", "Distance from the contact to the switch: find the force.", cover.LENGTH_FROM_0)
+    asked("--force N", "Force: find its reach and the pitch.", cover.NEWTON)
+    asked("--pitch M", "Pitch of a square sheet: find its smallest force.", cover.LENGTH)
+    asked("--thickness M", "Thickness of the cover; without it, find the best one.", cover.LENGTH)
+    switch = flag.group("switch")
+    usual = Switch()
+    switch("--switch-force N", "Force that closes the switch.", cover.NEWTON, usual.force_n)
+    switch("--switch-area M2", "Area of its face.", cover.FACE, usual.area_m2)
+    ball = flag.group("what touches, if known")
+    ball("--modulus PA", "Young's modulus of the cover.", cover.PASCAL)
+    ball("--poisson POISSON", "Poisson's ratio of the cover.", cover.POISSON, 0.5)
+    ball("--effective-radius M", "R* with 1/R* = 1/R + 1/R'.", cover.LENGTH)
+    model = flag.group("model (default: the simplest within the tolerance)")
     within = "What the cover is: a half-space, or a layer on a rigid base."
-    model.add_argument("--model", choices=("halfspace", "bonded", "frictionless"), help=within)
-    model.add_argument("--contact", choices=("point", "patch"), help="Contact of --model (default: point).")
+    model("--model", within, ("halfspace", "bonded", "frictionless"))
+    model("--contact", "Contact of --model (default: point).", ("point", "patch"))
     share = "Largest share by which the answer may be off (default: 0.05); refuse --model beyond it."
-    model.add_argument("--tolerance", type=cover.SHARE, help=share)
-    cover.json_flag(parser)
+    model("--tolerance TOLERANCE", share, cover.SHARE)
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -81,19 +78,22 @@ def run(args: argparse.Namespace) -> int:
         "contact": last.model.contact,
         "reference": str(sheet.reference),
         "error": last.error,
-        "dropped": list(last.dropped),
+        "dropped": last.dropped,
         "notes": list(dict.fromkeys(note for one in judged for note in one.notes)),
     }
     unsolved = any(isinstance(one.value, NoSolution) for one in judged)
-    if args.json:
-        return say(found) or (UNSOLVED if unsolved else 0)
     lines.append(("model", str(last.model)))
     if last.error is not None and last.model != sheet.reference:
         lines.append(("off from the reference by", f"{100 * last.error:+.1f} % ({sheet.reference})"))
     if last.dropped:
         lines.append(("left out", ", ".join(last.dropped)))
-    table(*lines)
-    return notes(found["notes"]) or (UNSOLVED if unsolved else 0)
+    results.show(args, found, lambda: _show(lines, found["notes"]))
+    return UNSOLVED if unsolved else 0
+
+
+def _show(lines: list[tuple[str, str]], said: list[str]) -> None:
+    results.table(*lines)
+    notes(said)
 
 
 def _answer(
@@ -120,13 +120,12 @@ def _best_thickness(args: argparse.Namespace, switch: Switch) -> int:
     thickness = sense.best_thickness_m(offset, within)
     force = PaddedSheet(switch, thickness).force_n(Model(within, "point"), offset)
     known = {"thickness_m": thickness, "force_n": force, "offset_m": offset, "model": within, "contact": "point"}
-    if args.json:
-        return say(known)
-    table(
+    lines = [
         (f"best thickness, {MM * offset:.4g} mm from a switch", f"{MM * thickness:.5g} mm"),
         ("force that closes it", f"{force:.5g} N"),
         ("model", f"{within}, point"),
-    )
+    ]
+    results.show(args, known, lambda: results.table(*lines))
     return 0
 
 

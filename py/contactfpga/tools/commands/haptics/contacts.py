@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import Any
 
 from contactfpga import terminal
 from contactfpga.robot.haptics import Center, Contacts, contacts
 from contactfpga.tools.commands.haptics import reading
+from contactfpga.tools.console import flags, results
 
 EXTRA = "haptics"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "file", metavar="FILE.json", help="The wrench, with contacts or a surface; docs/haptics.md has the format."
-    )
-    cones = "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices."
-    parser.add_argument("--cones", action="store_true", help=cones)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
+def add_flags(flag: flags.Flags) -> None:
+    flag("FILE.json", "The wrench, with contacts or a surface; docs/haptics.md has the format.")
+    flag("--cones", "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices.")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -28,10 +25,7 @@ def run(args: argparse.Namespace) -> int:
     answer = _answer(found)
     if surface is not None:
         answer["center_of_pressure"] = None if found.center is None else _center(found.center)
-    if args.json:
-        print(json.dumps(answer, allow_nan=False))
-    else:
-        _show(found, surface is not None)
+    results.show(args, answer, lambda: _show(found, surface is not None))
     return 0
 
 

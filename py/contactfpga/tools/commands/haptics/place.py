@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,43 +10,38 @@ from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
 from contactfpga.robot.haptics.rate import Rating, Requirements, UnitLayout, compared, draw, rate
 from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
-from contactfpga.tools.console import numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 
 EXTRA = "haptics"
 
 SHOWN = 3
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
+def add_flags(flag: flags.Flags) -> None:
     length = numbers.length(10.0)
-    link = parser.add_argument_group("link: a cylinder about z, or a plane")
-    link.add_argument("--radius", type=length, metavar="M", help="Outer radius of a cylinder, with its foam.")
-    link.add_argument("--length", type=length, metavar="M", help="Length of the cylinder that may be touched.")
-    link.add_argument("--width", type=length, metavar="M", help="Size of a plane along x.")
-    link.add_argument("--depth", type=length, metavar="M", help="Size of a plane along y.")
-    height = "Height of the plane above the units (default: 0)."
-    link.add_argument("--height", type=numbers.length(10.0, 0.0), default=0.0, metavar="M", help=height)
-    units = parser.add_argument_group("units")
+    link = flag.group("link: a cylinder about z, or a plane")
+    link("--radius M", "Outer radius of a cylinder, with its foam.", length)
+    link("--length M", "Length of the cylinder that may be touched.", length)
+    link("--width M", "Size of a plane along x.", length)
+    link("--depth M", "Size of a plane along y.", length)
+    link("--height M", "Height of the plane above the units.", numbers.length(10.0, 0.0), 0.0)
+    units = flag.group("units")
     ring = "Radius of the rings that units stand on (default: 0.8 of the cylinder's, 0.4 of the plane's smaller side)."
-    units.add_argument("--ring", type=length, metavar="M", help=ring)
-    noise = "Noise of a unit, as a share of what it must bear (default: 0.001)."
-    units.add_argument("--noise", type=numbers.number(1e-9, 1), default=0.001, metavar="SHARE", help=noise)
-    units.add_argument("--units", metavar="FILE", help="Also rate the units in this TOML file.")
-    loads = parser.add_argument_group("loads")
-    newton, share = numbers.number(1e-3, 1e6, "N"), numbers.number(0, 10)
-    loads.add_argument("--force", type=newton, default=30.0, metavar="N", help="Largest push (default: 30).")
-    loads.add_argument("--friction", type=share, default=0.5, metavar="MU", help="Friction coefficient (default: 0.5).")
-    at = "Push at which errors are stated (default: 12)."
-    loads.add_argument("--at", type=newton, default=12.0, metavar="N", help=at)
-    mass = "Mass of the bumper, whose weight is taken out in every pose (default: 0)."
-    loads.add_argument("--mass", type=numbers.number(0, 1000, "kg"), default=0.0, metavar="KG", help=mass)
-    sigma = "With --mass: how accurately gravity and motion are known (default: 0.1)."
-    loads.add_argument(
-        "--acceleration-sigma", type=numbers.number(0, 100, "m/s2"), default=0.1, metavar="M/S2", help=sigma
-    )
-    parser.add_argument("--all", action="store_true", help="Print every arrangement, not only the best of each kind.")
-    parser.add_argument("--picture", metavar="FILE", help="Draw the best one into this .svg or .png (extra sim).")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
+    units("--ring M", ring, length)
+    units("--noise SHARE", "Noise of a unit, as a share of what it must bear.", numbers.number(1e-9, 1), 0.001)
+    units("--units FILE", "Also rate the units in this TOML file.")
+    loads = flag.group("loads")
+    newton = numbers.number(1e-3, 1e6, "N")
+    loads("--force N", "Largest push.", newton, 30.0)
+    loads("--friction MU", "Friction coefficient.", numbers.number(0, 10), 0.5)
+    loads("--at N", "Push at which errors are stated.", newton, 12.0)
+    mass = "Mass of the bumper, whose weight is taken out in every pose."
+    loads("--mass KG", mass, numbers.number(0, 1000, "kg"), 0.0)
+    sigma = "With --mass: how accurately gravity and motion are known."
+    loads("--acceleration-sigma M/S2", sigma, numbers.number(0, 100, "m/s2"), 0.1)
+    flag("--all", "Print every arrangement, not only the best of each kind.")
+    flag("--picture FILE", "Draw the best one into this .svg or .png (extra sim).")
+    flags.json(flag, flags.SI)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,10 +52,8 @@ def run(args: argparse.Namespace) -> int:
     ratings = compared(needs, args.ring or ring)
     if args.units:
         ratings = sorted([*ratings, _own(needs, args.units)], key=lambda rating: rating.place_m)
-    if args.json:
-        print(json.dumps({"layouts": [_answer(rating) for rating in ratings]}, allow_nan=False))
-    else:
-        _show(needs, ratings if args.all else _best(ratings))
+    answer = {"layouts": [_answer(rating) for rating in ratings]}
+    results.show(args, answer, lambda: _show(needs, ratings if args.all else _best(ratings)))
     if picture is not None:
         draw(picture, needs, ratings)
     return 0

@@ -9,20 +9,21 @@ from contactfpga import terminal
 from contactfpga.errors import NoSuchCommand
 from contactfpga.inputs.values import shown
 from contactfpga.robot.haptics import HapticsError, LoadCells
-from contactfpga.tools.console import flags
+from contactfpga.tools.console import flags, results
 from contactfpga.tools.console.forces import cells_of
+from contactfpga.wire.units import UnitFacts
 
 EXTRA = "haptics"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
     unit = "Unit K raises contact from this deviation on, either way; 0: never. May be given again for other units."
-    parser.add_argument("--unit", action="append", default=[], metavar="K=STEPS", help=unit)
-    whole = "Sum K, a row of the Skin's unit_sums, likewise."
-    parser.add_argument("--sum", action="append", default=[], metavar="K=STEPS", help=whole)
+    flag("--unit K=STEPS ...", unit, default=[])
+    flag("--sum K=STEPS ...", "Sum K, a row of the Skin's unit_sums, likewise.", default=[])
     units = "The units (docs/haptics.md): then --unit takes newtons, as 0=8, and so does --sum if all gains are equal."
-    parser.add_argument("--units", metavar="FILE", help=units)
+    flag("--units FILE", units)
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -34,19 +35,25 @@ def run(args: argparse.Namespace) -> int:
         if facts is None:
             raise NoSuchCommand(f"{board.port}: this board has no pressure units; build its Skin with units")
         cells = None if args.units is None else cells_of(board, args.units)
-        for kind, number, value in pairs:
-            limit = facts.count if kind == "unit" else facts.sums
-            if number >= limit:
-                raise HapticsError(f"--{kind} names {kind} {number}; the board has {limit}, counted from 0")
-            steps = value if cells is None else _steps(cells, kind, number, value)
-            given = round(steps)
-            if given == 0 and value != 0:
-                raise HapticsError(f"--{kind} {number}={value:g} is less than half a step; 0 would mean never")
+        wanted = [(*pair[:2], _checked(facts, cells, *pair)) for pair in pairs]  # all, before the first is set
+        for kind, number, steps in wanted:
             set_one = board.set_threshold if kind == "unit" else board.set_sum_threshold
-            set_one(number, given)
-            said = "never raises contact" if given == 0 else f"raises contact from a deviation of {given} steps on"
-            terminal.say(f"{kind} {number}: {said}; the board took it")
+            set_one(number, steps)
+            said = "never raises contact" if steps == 0 else f"raises contact from a deviation of {steps} steps on"
+            if not args.json:
+                terminal.say(f"{kind} {number}: {said}; the board took it")
+    results.show(args, {"thresholds": [{kind: number, "steps": steps} for kind, number, steps in wanted]})
     return 0
+
+
+def _checked(facts: UnitFacts, cells: LoadCells | None, kind: str, number: int, value: float) -> int:
+    limit = facts.count if kind == "unit" else facts.sums
+    if number >= limit:
+        raise HapticsError(f"--{kind} names {kind} {number}; the board has {limit}, counted from 0")
+    steps = round(value if cells is None else _steps(cells, kind, number, value))
+    if steps == 0 and value != 0:
+        raise HapticsError(f"--{kind} {number}={value:g} is less than half a step; 0 would mean never")
+    return steps
 
 
 def _pair(flag: str, text: str) -> tuple[int, float]:

@@ -13,7 +13,7 @@ from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import HapticsError, WithReadings
 from contactfpga.robot.haptics.units import write
 from contactfpga.surfaces.shapes import Floats
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.tools.console.forces import cells_of
 
 EXTRA = "haptics"
@@ -21,13 +21,12 @@ EXTRA = "haptics"
 LEAST = 10
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
-    long = "Seconds of the board's time over which readings are averaged (default: 0.1)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, default=0.1, metavar="S", help=long)
-    units = "The units (docs/haptics.md): refuse readings that are noisier than this file states."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    flags.output(parser, "Write the units with their new zeros to this TOML file.")
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
+    flag("--seconds S", "Seconds of the board's time over which readings are averaged.", numbers.SECONDS, 0.1)
+    flag("--units FILE", "The units (docs/haptics.md): refuse readings that are noisier than this file states.")
+    flags.output(flag, "Write the units with their new zeros to this TOML file.")
+    flags.json(flag)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,13 +37,16 @@ def run(args: argparse.Namespace) -> int:
         cells = None if args.units is None else cells_of(board, args.units)
         read = _readings(board, args.seconds)
         better = None if cells is None else cells.rezeroed(read, 0)
-        for unit, mean in enumerate(read.mean(axis=0)):
-            board.set_zero(unit, round(float(mean)))
-            spread = float(read[:, unit].std(ddof=1))
-            terminal.say(f"unit {unit}: zero {mean:.1f} steps, spread {spread:.2f}; the board took {round(mean)}")
+        units = []
+        for unit, (mean, spread) in enumerate(zip(read.mean(axis=0).tolist(), read.std(axis=0, ddof=1).tolist())):
+            board.set_zero(unit, round(mean))
+            units.append({"zero_steps": mean, "spread_steps": spread, "set_steps": round(mean)})
+            if not args.json:
+                terminal.say(f"unit {unit}: zero {mean:.1f} steps, spread {spread:.2f}; the board took {round(mean)}")
     if output is not None and better is not None:
         write_text(output, write(better))
-        terminal.say(f"wrote {output}")
+    written = None if output is None else lambda: terminal.say(f"wrote {output}")
+    results.show(args, {"units": units, "file": output}, written)
     return 0
 
 

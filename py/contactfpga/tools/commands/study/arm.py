@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
@@ -24,26 +22,21 @@ EXTRA = "sim"
 PLACES = 60
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
-    parser.add_argument("--case", default="paper", metavar="CASE", help=case)
-    late, usual = numbers.number(0, 1e7, "us"), "Latency from the switch to the controller (default: the paper's 6000)."
-    parser.add_argument("--latency-us", type=late, default=6000.0, metavar="US", help=usual)
-    many, places = (
-        numbers.whole(0, 10_000),
-        "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place).",
-    )
-    parser.add_argument("--places", type=many, metavar="N", help=places)
-    parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
-    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
-    charts = "Draw force and thickness against latency instead."
-    parser.add_argument("--charts", action="store_true", help=charts)
+def add_flags(flag: flags.Flags) -> None:
+    flag("--case CASE", "Case to run: paper, paper-offset, push or a .toml file.", default="paper")
+    usual = "Latency from the switch to the controller (default: the paper's 6000)."
+    flag("--latency-us US", usual, numbers.number(0, 1e7, "us"), 6000.0)
+    places = "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place)."
+    flag("--places N", places, numbers.whole(0, 10_000))
+    flag("--skin FILE", "Skin of the sheet (default: the reference Skin).")
+    flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
+    flag("--charts", "Draw force and thickness against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
-    parser.add_argument("--regions", metavar="FILE.toml", help=regions)
+    flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
-    parser.add_argument("--force-threshold", action="store_true", help=force)
-    flags.workers(parser)
-    flags.output_folder(parser, "build/arm")
+    flag("--force-threshold", force)
+    flags.workers(flag)
+    flags.output_folder(flag, "build/arm")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
     if args.regions:
         return _regions(args, case)
     if args.charts:
+        if args.json:
+            raise ContactFPGAError("--charts only writes files, which it names; leave --json out")
         return _charts(args, case)
     if args.force_threshold:
         return _units(args, case)
@@ -75,7 +70,7 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
         known = report.as_json(found, args.case)
         if touched is not None:
             known["anywhere"] = anywhere.as_json(touched, late)
-        print(json.dumps(known, indent=2))
+        results.show(args, known)
         return 0
     title = f"Case {args.case}: time counts from the touch, {case.link.speed_m_s:g} m/s"
     tables.show(report.table(found, args.case == "paper"), title=title)
@@ -105,7 +100,7 @@ def _units(args: argparse.Namespace, case: Case) -> int:
         raise ContactFPGAError(f"{what}; leave --skin and such a case out")
     lines = report.defense_lines(case)
     if args.json:
-        print(json.dumps([dict(zip(lines[0], line)) for line in lines[1:]], indent=2))
+        results.show(args, [dict(zip(lines[0], line)) for line in lines[1:]])
         return 0
     tables.show(lines, title=f"Case {args.case}: {case.link.speed_m_s:g} m/s")
     return 0
@@ -119,7 +114,7 @@ def _regions(args: argparse.Namespace, case: Case) -> int:
     late = 1e-6 * args.latency_us
     found = [limits_of(case.pressing, one, case.link.speed_m_s, late) for one in load_regions(args.regions)]
     if args.json:
-        print(json.dumps([region_plain(one) for one in found], indent=2))
+        results.show(args, [region_plain(one) for one in found])
         return 0
     title = f"Case {args.case}: {case.link.speed_m_s:g} m/s, reaction after {1e3 * late:g} ms"
     tables.show([REGION_HEADS, *map(region_row, found)], title=title)
@@ -132,8 +127,8 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
 
     fastest, pushes = comply.pushes(case)
     if args.json:
-        known = {"case": args.case, "fastest_m_s": fastest, "pushes": [dataclasses.asdict(push) for push in pushes]}
-        print(json.dumps(known, indent=2))
+        known = {"case": args.case, "fastest_m_s": fastest, "pushes": pushes}
+        results.show(args, known)
         return 0
     title = f"Case {args.case}: pushed by {1e3 * case.touch[0].push_m:g} mm and let go"
     tables.show(report.push_lines(pushes), title=title)

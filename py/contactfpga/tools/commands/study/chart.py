@@ -17,19 +17,15 @@ if TYPE_CHECKING:
 EXTRA = "chart"
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--method", action="append", metavar="NAME", help="Chart only this method; can be repeated.")
-    own = "Add this labeller, module:attribute of your own, to the methods; can be repeated."
-    parser.add_argument("--labeller", action="append", metavar="NAME", help=own)
-    parser.add_argument("--family", action="append", metavar="NAME", help="Use only these scenes; can be repeated.")
-    count, usual = numbers.whole(1, 1_000_000), "Number of scenes per point (default: 400)."
-    parser.add_argument("--placements", type=count, default=400, metavar="N", help=usual)
-    parser.add_argument(
-        "--seed", type=numbers.SEED, default=0, metavar="N", help="Seed of the placements (default: 0)."
-    )
-    flags.workers(parser)
-    parser.add_argument("--no-size", action="store_true", help="Leave out place and route.")
-    flags.output_folder(parser, "build/chart")
+def add_flags(flag: flags.Flags) -> None:
+    flag("--method NAME ...", "Chart only this method; can be repeated.")
+    flag("--labeller NAME ...", "Add this labeller, module:attribute of your own, to the methods; can be repeated.")
+    flag("--family NAME ...", "Use only these scenes; can be repeated.")
+    flag("--placements N", "Number of scenes per point.", numbers.whole(1, 1_000_000), 400)
+    flag("--seed N", "Seed of the placements.", numbers.SEED, 0)
+    flags.workers(flag)
+    flag("--no-size", "Leave out place and route.")
+    flags.output_folder(flag, "build/chart")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,16 +12,15 @@ from contactfpga.tools.console import flags, live, numbers
 EXTRA = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    flags.connection(parser)
-    flags.once(parser)
+def add_flags(flag: flags.Flags) -> None:
+    flags.connection(flag)
+    flags.once(flag)
     bounces = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
-    parser.add_argument("--bounce", action="store_true", help=bounces)
+    flag("--bounce", bounces)
     settles = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
-    parser.add_argument("--settle", action="store_true", help=settles)
-    seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
-    parser.add_argument("--json", action="store_true", help="Print one JSON object with what was measured.")
+    flag("--settle", settles)
+    flag("--seconds S", "Seconds of device time to measure for (default: until Ctrl-C).", numbers.SECONDS)
+    flags.json(flag, "Print one JSON object with what was measured.")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
 from contactfpga.instruments.bounce import QUIET_US, Bounce
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, live
+from contactfpga.tools.console import flags, live, results
 from contactfpga.zones.zone import Zones
 
 SHARES = (50, 90, 99, 100)
@@ -43,10 +42,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     seconds, end = live.follow(board, args, bounce.update, None if args.json else render)
     bounce.finish()
     end += _overwritten(board)
-    if args.json:
-        print(json.dumps(_answer(bounce, seconds, end)), flush=True)
-    else:
-        _show(bounce, skin, end)
+    results.show(args, _answer(bounce, seconds, end), lambda: _show(bounce, skin, end))
     return 0 if bounce.bounced else 1
 
 
@@ -97,8 +93,8 @@ def _answer(bounce: Bounce, seconds: float, end: list[Finding]) -> dict[str, Any
         "release_us": _shares(bounce, False),
         "cells": [{"cell": cell, "longest_us": us} for cell, us in bounce.longest().items()],
         "slow": list(bounce.slow()),
-        "proposal": None if proposal is None else dataclasses.asdict(proposal),
-        "findings": [finding._asdict() for finding in end],
+        "proposal": proposal,
+        "findings": end,
     }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTi
 from contactfpga.instruments.settling import Settling
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
-from contactfpga.tools.console import interrupt, live
+from contactfpga.tools.console import interrupt, live, results
 from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Mask, SheetDrawing
 from contactfpga.zones.zone import Zones
 
@@ -39,10 +38,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
     render = None if args.json else lambda _, room: _view(found, skin, room)
     seconds, end = follow(board, found, args.timeout, args.seconds, render)
-    if args.json:
-        print(json.dumps(_answer(found, skin, seconds, end)), flush=True)
-    else:
-        _show(found, skin, end)
+    results.show(args, _answer(found, skin, seconds, end), lambda: _show(found, skin, end))
     return 0 if (found.clocks > 0).any() else 1
 
 
@@ -122,11 +118,11 @@ def _answer(found: Settling, skin: Skin, seconds: float, end: list[Finding]) -> 
         "first_clocks": found.first,
         "clocks": clocks,
         "us": [[None if cell is None else cell / per_us for cell in row] for row in clocks],
-        "median_clocks": None if np.isnan(found.median) else found.median,
+        "median_clocks": found.median,
         "slow": {"cells": slow.cells, "rows": slow.rows, "columns": slow.columns},
         "back_clocks": [int(column) or None for column in found.back_clocks],
         "proposal": None if (settle_us := _proposed_us(found, skin)) is None else {"settle_us": settle_us},
-        "findings": [finding._asdict() for finding in end],
+        "findings": end,
     }
 
 
