@@ -1,0 +1,141 @@
+"""A body pressed on a cover: soft layers in series, each of which yields under the pressure right above it.
+
+A layer of thickness t carries the pressure p = E e / (1 - e) at the strain e: E is its modulus at first, and it is
+solid at e = 1. The body's flesh, the cover's foam and the switches' travel are such layers between the body's shape and
+a rigid base. At the depth d beyond its first touch a body presses a round part, whose half axes at the depth D are a
+and b, in by d (1 - (x/a')^2 - (y/b')^2) within a' = a sqrt(d/D), b' = b sqrt(d/D), and a flat part by d throughout.
+With P(d) = int_0^d p, the force is
+
+    F = A_round/D P(d) + A_flat p(d).
+
+What couples columns sideways is left out. In a tile of foam it adds less than 10 % to the force for Poisson's ratios up
+to 0.25. Whole foam of the thickness h presses harder by the factor 1 + 0.16 h^2/(a' b') (both: the tests' finite
+elements).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.design.cover.answer import CoverError, positive
+from contactfpga.design.cover.numerics import Floats
+from contactfpga.design.cover.patch import Ellipse, Pad, Part
+
+COUPLING = 0.16
+"""Share by which whole foam as thick as the patch's radius presses harder than its columns alone."""
+
+STEPS = 385
+"""Pressures in a table, 6 % apart."""
+
+RANGE = 1e-6, 1e4
+"""Least and largest of these pressures, over the modulus of the softest layer."""
+
+
+class Layer(NamedTuple):
+    """A soft layer: p = E e / (1 - e)."""
+
+    thickness_m: float
+    modulus_pa: float
+    """E of small strains."""
+
+    def pressed_m(self, pressure_pa: Floats) -> Floats:
+        """Compression under a pressure."""
+        return np.asarray(self.thickness_m * pressure_pa / (self.modulus_pa + pressure_pa))
+
+
+class Spring(NamedTuple):
+    """Switches that give way in proportion to the force, up to their travel."""
+
+    stiffness_pa_m: float
+    """Pressure per travel: a switch's stiffness over the area that rests on it."""
+    travel_m: float
+
+    def pressed_m(self, pressure_pa: Floats) -> Floats:
+        """Travel under a pressure."""
+        return np.asarray(np.minimum(pressure_pa / self.stiffness_pa_m, self.travel_m))
+
+
+class Body(NamedTuple):
+    """What presses the cover."""
+
+    name: str
+    depth_m: float
+    """Depth D at which its parts have their half axes."""
+    flesh: Layer | None
+    """None: rigid."""
+    source: str
+
+
+BODIES = {
+    body.name: body
+    for body in (
+        Body(
+            "finger",
+            3e-3,
+            Layer(6e-3, 55e3),
+            "chosen: 12 x 10 mm of contact and 3 mm of depth at 2 N on a hard plate, stiffer with each mm",
+        ),
+        Body("palm", 5e-3, Layer(10e-3, 40e3), "chosen: softer and thicker than a finger's pad"),
+        Body("forearm", 5e-3, Layer(15e-3, 40e3), "chosen: muscle on bone"),
+        Body("rigid", 1e-3, None, "a bumper or tool"),
+    )
+}
+
+
+class Pressing:
+    """Parts of a body on layers in series.
+
+    ``depth_m``: the depth at which the parts have their half axes. ``share``: part of the surface that carries, less
+    the gaps between tiles. ``whole_m``: thickness of foam that is not cut, 0 of tiles. Raises CoverError if nothing is
+    soft.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        depth_m: float,
+        layers: Sequence[Layer | Spring],
+        share: float = 1.0,
+        whole_m: float = 0.0,
+    ):
+        moduli = [layer.modulus_pa for layer in layers if isinstance(layer, Layer)]
+        if not moduli:
+            raise CoverError("neither body nor cover is soft; give the body flesh or the cover foam")
+        self.parts, self._full_m, self._whole_m = tuple(parts), positive("depth_m", depth_m, "m"), whole_m
+        pressure = np.append(0.0, min(moduli) * np.geomspace(*RANGE, STEPS - 1))
+        self._depth_m: Floats = sum((layer.pressed_m(pressure) for layer in layers), np.zeros(STEPS))
+        self._pressure_pa: Floats = share * pressure
+        means = (self._pressure_pa[1:] + self._pressure_pa[:-1]) / 2
+        self._integral = np.append(0.0, (np.diff(self._depth_m) * means).cumsum())
+        self._each_n = np.array([self._forces(part) for part in self.parts])
+        self._force_n = self._each_n.sum(axis=0)
+
+    def force_n(self, depth_m: float) -> float:
+        """Force at a depth; 0 above the surface."""
+        return float(np.interp(depth_m, self._depth_m, self._force_n))
+
+    def depth_m(self, force_n: float) -> float:
+        """Depth at a force."""
+        return float(np.interp(force_n, self._force_n, self._depth_m))
+
+    def pressed(self, depth_m: float) -> list[tuple[Part, float]]:
+        """Each part as it is at a depth above 0, with its force."""
+        forces = [float(np.interp(depth_m, self._depth_m, each)) for each in self._each_n]
+        return [(self._at(part, depth_m), force) for part, force in zip(self.parts, forces, strict=True)]
+
+    def _forces(self, part: Part) -> Floats:
+        if not isinstance(part, Ellipse):
+            return part.area_m2 * self._pressure_pa
+        coupling = COUPLING * self._whole_m**2 * self._full_m / (part.half_x_m * part.half_y_m)
+        more = np.append(1.0, 1 + coupling / self._depth_m[1:])
+        return part.area_m2 / self._full_m * self._integral * more
+
+    def _at(self, part: Part, depth_m: float) -> Part:
+        if not isinstance(part, Ellipse):
+            return part
+        profile = np.interp(depth_m * Pad.SHARES, self._depth_m, self._pressure_pa)
+        return Pad.of(part, math.sqrt(depth_m / self._full_m), profile)
