@@ -20,7 +20,9 @@ import numpy as np
 
 from contactfpga.design.cover import medium, point
 from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
+from contactfpga.design.cover.layers import Body, Pressing
 from contactfpga.design.cover.numerics import Floats
+from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.press import Cover, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
@@ -68,6 +70,11 @@ class Cells:
         switch = self.cover.switch
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
+
+    def pressing(self, parts: Sequence[Part], body: Body) -> Pressing:
+        """A body's parts on these switches' cover."""
+        down, across = self._axes
+        return self.cover.pressing(parts, body, across.pitch_m, down.pitch_m)
 
     def forces_n(self, loads: Sequence[Load]) -> Floats:
         """(rows, columns) force on each switch, summed over loads; below 0 where foam is pulled off."""
@@ -146,7 +153,7 @@ class Cells:
             2 * np.pi * np.fft.rfftfreq(len(across.places_m), across.step_m),
         )
         number = np.hypot(waves[0][:, None], waves[1])
-        return medium.transfer(self.cover.within, number * self.cover.thickness_m)
+        return medium.transfer("foam", number * self.cover.thickness_m)
 
     def _given_way(self, taken: Floats) -> Floats:
         down, across = self._axes

@@ -1,6 +1,7 @@
-"""Whether a light finger, an ellipse with Hertz's pressure, is felt anywhere on a sheet.
+"""From which force on a finger is felt anywhere on a sheet.
 
-A touch is felt from the least ratio of closing force to force share on.
+A switch's share of the force falls as the patch grows. Around the force that closes the first switch it is taken as a
+power of the force.
 """
 
 from __future__ import annotations
@@ -13,12 +14,22 @@ import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, NoSolution, positive
 from contactfpga.design.cover.cells import BEYOND, Cells
+from contactfpga.design.cover.layers import BODIES, Body
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Ellipse
 from contactfpga.design.cover.press import Cover, Load
 
 LENGTH_M, WIDTH_M = 12e-3, 10e-3
-"""Length and width of a light fingertip's contact."""
+"""Length and width of a fingertip's contact at its body's depth."""
+
+BODY = BODIES["finger"]
+
+ROUNDS, APART, LEAST_RISE = 3, 1.25, 0.2
+"""Estimates of the force from the shares at the estimate before; ratio of the forces that tell the power, and its
+least."""
+
+GROWN = 1.5
+"""Half axes at the largest force that is looked at, over those at the body's depth."""
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
@@ -78,9 +89,9 @@ class Felt:
     worst_m: tuple[float, float]
     """x and y of the worst place from the first switch."""
     least_share: float
-    """Force share of the most pressed switch, at the worst place."""
+    """Share of the force on the switch that closes first, as it closes, at the place where that is least."""
     median_share: float
-    """Median force share of the most pressed switch."""
+    """Median of these shares."""
     false_presses: float
     """Expected number of switches that close without a touch."""
 
@@ -94,8 +105,10 @@ def feel(
     acceleration_m_s2: float = 0.0,
     foam_kg_m3: float = 0.0,
     seed: int = 0,
+    body: Body = BODY,
 ) -> Felt:
-    """Sensitivity of a sheet to an elliptic finger, ``length_m`` long and ``width_m`` wide.
+    """Sensitivity of a sheet to a ``body`` whose patch is an ellipse, ``length_m`` long and ``width_m`` wide at its
+    depth.
 
     ``seed`` is the first of :data:`SHEETS`; acceleration and density are for
     :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``.
@@ -105,15 +118,11 @@ def feel(
         raise CoverError(f"places is {places}; it must lie between 1 and {MOST_PLACES}")
     whole = _cells(cover, sheet, seed)
     closing = _closing(cover, sheet, whole, seed)
-    window = _Window(cover, sheet, max(half))
+    window = _Window(cover, sheet, Ellipse(*half), body)
     at = spread_evenly(places, sheet)
     forces, shares = np.empty((len(closing), places)), np.empty(places)
-    for number, (x, y, angle) in enumerate(at):
-        taken, there = window.taken(Ellipse(*half, x, y, angle))
-        present = np.isfinite(closing[0][there])
-        shares[number] = taken[present].max(initial=0.0)
-        with np.errstate(divide="ignore"):
-            forces[:, number] = np.where(taken > LEAST_SHARE, closing[:, *there] / taken, np.inf).min(axis=(1, 2))
+    for number, place in enumerate(at):
+        forces[:, number], shares[number] = window.closing_n(closing, *place.tolist())
     worst = int(np.median(forces, axis=0).argmax())
     half_n, most_n, worst_n = (
         _force(np.quantile(forces, part, axis=1, method="inverted_cdf"), part) for part in (0.5, 0.99, 1.0)
@@ -163,24 +172,44 @@ def _touches(part: float) -> str:
 
 
 class _Window:
-    def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
+    """The switches around a finger, of which more do not matter."""
+
+    def __init__(self, cover: Cover, sheet: Sheet, finger: Ellipse, body: Body):
         self.sheet = sheet
         beyond = 0.0 if cover.cut else BEYOND * cover.thickness_m
         more = NEIGHBORS + 2 if cover.gives_way else 1
+        reach_m = GROWN * max(finger.half_x_m, finger.half_y_m) + beyond
         sides = [(sheet.rows, sheet.pitch_y_m), (sheet.columns, sheet.pitch_x_m)]
-        wanted = [2 * (math.ceil((reach_m + beyond) / positive("pitch", pitch, "m")) + more) + 1 for _, pitch in sides]
+        wanted = [2 * (math.ceil(reach_m / positive("pitch", pitch, "m")) + more) + 1 for _, pitch in sides]
         rows, columns = (min(count, most) for (count, _), most in zip(sides, wanted, strict=True))
-        self.cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
+        self._cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
+        self._pressing = self._cells.pressing([finger], body)
 
-    def taken(self, finger: Ellipse) -> tuple[Floats, tuple[np.ndarray, np.ndarray]]:
-        sheet, (high, wide) = self.sheet, self.cells.shape
-        top = self._start(finger.y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
-        left = self._start(finger.x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)
-        moved = dataclasses.replace(
-            finger, x_m=finger.x_m - left * sheet.pitch_x_m, y_m=finger.y_m - top * sheet.pitch_y_m
-        )
-        found = self.cells.forces_n([Load((moved,), 1.0)])
-        return found, (top + np.arange(high)[:, None], (left + np.arange(wide)) % sheet.columns)
+    def closing_n(self, closing_n: Floats, x_m: float, y_m: float, angle_rad: float) -> tuple[Floats, float]:
+        """(sheets,) force at this place that closes the first switch of each sheet with (sheets, rows, columns) closing
+        forces, and that switch's share on the first sheet."""
+        sheet, (high, wide) = self.sheet, self._cells.shape
+        top = self._start(y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
+        left = self._start(x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)
+        needed = closing_n[:, top + np.arange(high)[:, None], (left + np.arange(wide)) % sheet.columns]
+        place = x_m - left * sheet.pitch_x_m, y_m - top * sheet.pitch_y_m, angle_rad
+        force = 1.0
+        for _ in range(ROUNDS):
+            shares = self._shares(force, *place)
+            pressed = shares > LEAST_SHARE
+            force = float((needed[0] / np.where(pressed, shares, np.nan)).min(initial=math.inf, where=pressed))
+            if not math.isfinite(force):
+                return np.full(len(needed), math.inf), 0.0
+        shares, more = (self._shares(part * force, *place) for part in (1.0, APART))
+        pressed = (shares > LEAST_SHARE) & (more > LEAST_SHARE)
+        rises = 1 + np.log(np.where(pressed, more / np.where(pressed, shares, 1.0), 1.0)) / math.log(APART)
+        least = force * (needed / (force * np.where(pressed, shares, np.nan))) ** (1 / np.maximum(rises, LEAST_RISE))
+        first = int(np.where(pressed, least[0], math.inf).argmin())
+        return least.min(axis=(1, 2), initial=math.inf, where=pressed), float(shares.flat[first])
+
+    def _shares(self, force_n: float, x_m: float, y_m: float, angle_rad: float) -> Floats:
+        parts = self._pressing.parts_at(self._pressing.depth_m(force_n))
+        return self._cells.forces_n([Load(tuple(part.placed(x_m, y_m, angle_rad) for part in parts), 1.0)])
 
     @staticmethod
     def _start(middle: float, width: int, count: int, closed: bool) -> int:

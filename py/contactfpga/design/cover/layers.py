@@ -69,6 +69,11 @@ class Body(NamedTuple):
     """None: rigid."""
     source: str
 
+    def ball(self, radius_m: float) -> Ellipse:
+        """The part of a round body: at the depth D it reaches to sqrt(2 R D)."""
+        half = math.sqrt(2 * positive("radius_m", radius_m, "m") * self.depth_m)
+        return Ellipse(half, half)
+
 
 BODIES = {
     body.name: body
@@ -105,14 +110,13 @@ class Pressing:
         moduli = [layer.modulus_pa for layer in layers if isinstance(layer, Layer)]
         if not moduli:
             raise CoverError("neither body nor cover is soft; give the body flesh or the cover foam")
-        self.parts, self._full_m, self._whole_m = tuple(parts), positive("depth_m", depth_m, "m"), whole_m
+        self._parts, self._full_m, self._whole_m = tuple(parts), positive("depth_m", depth_m, "m"), whole_m
         pressure = np.append(0.0, min(moduli) * np.geomspace(*RANGE, STEPS - 1))
         self._depth_m: Floats = sum((layer.pressed_m(pressure) for layer in layers), np.zeros(STEPS))
         self._pressure_pa: Floats = share * pressure
         means = (self._pressure_pa[1:] + self._pressure_pa[:-1]) / 2
         self._integral = np.append(0.0, (np.diff(self._depth_m) * means).cumsum())
-        self._each_n = np.array([self._forces(part) for part in self.parts])
-        self._force_n = self._each_n.sum(axis=0)
+        self._force_n: Floats = sum((self._forces(part) for part in self._parts), np.zeros(STEPS))
 
     def force_n(self, depth_m: float) -> float:
         """Force at a depth; 0 above the surface."""
@@ -122,20 +126,19 @@ class Pressing:
         """Depth at a force."""
         return float(np.interp(force_n, self._force_n, self._depth_m))
 
-    def pressed(self, depth_m: float) -> list[tuple[Part, float]]:
-        """Each part as it is at a depth above 0, with its force."""
-        forces = [float(np.interp(depth_m, self._depth_m, each)) for each in self._each_n]
-        return [(self._at(part, depth_m), force) for part, force in zip(self.parts, forces, strict=True)]
+    def parts_at(self, depth_m: float) -> tuple[Part, ...]:
+        """The parts as they are pressed at a depth above 0."""
+        return tuple(self._at(part, depth_m) for part in self._parts)
 
     def _forces(self, part: Part) -> Floats:
         if not isinstance(part, Ellipse):
-            return part.area_m2 * self._pressure_pa
+            return np.asarray(part.area_m2 * self._pressure_pa)
         coupling = COUPLING * self._whole_m**2 * self._full_m / (part.half_x_m * part.half_y_m)
         more = np.append(1.0, 1 + coupling / self._depth_m[1:])
-        return part.area_m2 / self._full_m * self._integral * more
+        return np.asarray(part.area_m2 / self._full_m * self._integral * more)
 
     def _at(self, part: Part, depth_m: float) -> Part:
         if not isinstance(part, Ellipse):
             return part
-        profile = np.interp(depth_m * Pad.SHARES, self._depth_m, self._pressure_pa)
-        return Pad.of(part, math.sqrt(depth_m / self._full_m), profile)
+        pressures = np.interp(depth_m * Pad.SHARES, self._depth_m, self._pressure_pa)
+        return Pad.of(part, math.sqrt(depth_m / self._full_m), pressures)

@@ -11,17 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover import hertz, medium, point
+from contactfpga.design.cover import medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
-from contactfpga.design.cover.patch import Ellipse, Part
+from contactfpga.design.cover.layers import Body, Layer, Pressing, Spring
+from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.point import Switch
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
-MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
-"""``patch``: a switch closes under the contact's shape, whatever the force. ``point``: each part's force acts at its
-middle on a half-space, paper (9). Each part's pressure acts with ``hertz`` on a half-space, with ``bonded`` or
-``frictionless`` on a layer glued to a rigid base or sliding on it."""
+MODELS = ("patch", "foam", "point")
+"""``patch``: a switch closes under the contact's shape, whatever the force. ``foam``: body and foam are pressed as
+layers (:mod:`contactfpga.design.cover.layers`), and whole foam spreads the pressure (``foam`` of
+:mod:`contactfpga.design.cover.medium`). ``point``: each part's force acts at its middle on a half-space, paper (9)."""
+
+GONE = ("hertz", "bonded", "frictionless")
+"""Models of earlier versions."""
 
 SHEAR = 6 / 5
 """Shear deflection of a strip over that by its mean shear stress (Timoshenko)."""
@@ -32,9 +36,6 @@ GIVES = 0.75
 
 GRID = 16
 """Sampling points per side of a switch's face for :attr:`Cover.share`."""
-
-BLOCK = 1 << 15
-"""Stresses summed at once; these fit the cache."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,18 +88,16 @@ class Cover:
     """Cap on each switch; None: the foam presses the switch's own face, flush with its surroundings."""
     cut: bool = False
     """Whether the foam is cut between the caps."""
-    modulus_pa: float = 3.45e5
-    """Young's modulus of the foam, for the yield under proud caps."""
-    poisson: float = 0.3
-    """Poisson's ratio of the foam, for the yield under proud caps."""
+    modulus_pa: float = 1.2e5
+    """E of the foam at small strains; by default Plastazote LD33's."""
 
     def __post_init__(self) -> None:
+        if self.model in GONE:
+            raise CoverError(f"model is {shown(self.model)}, which no longer exists; take 'foam'")
         if self.model not in MODELS:
             raise CoverError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         positive("thickness_m", self.thickness_m, "m")
         positive("modulus_pa", self.modulus_pa, "Pa")
-        if not is_finite(self.poisson) or not -1 < self.poisson <= 0.5:
-            raise CoverError(f"poisson is {shown(self.poisson)}; it must lie above -1 and not above 0.5")
         if not isinstance(self.cut, bool):
             raise CoverError(f"cut is {shown(self.cut)}; it must be true or false")
         self._check_caps()
@@ -113,16 +112,11 @@ class Cover:
         if self.model in ("patch", "point"):
             for name in ("cap", "cut"):
                 if getattr(self, name):
-                    raise CoverError(f"the model {self.model!r} knows no {name}; take one of {', '.join(MODELS[2:])}")
+                    raise CoverError(f"the model {self.model!r} knows no {name}; take 'foam'")
         if self.cut and self.cap is None:
             raise CoverError("cut is true; foam is cut between caps, give [cover.cap] as well")
         if self.switch.travel_m and not (self.cap and self.cap.proud):
             raise CoverError(f"travel_m is {self.switch.travel_m:g}; only a switch under a proud cap may give way")
-
-    @property
-    def within(self) -> str:
-        """The model's name in :data:`contactfpga.design.cover.medium.MEDIA`."""
-        return self.model if self.model in medium.MEDIA else "halfspace"
 
     @property
     def side_m(self) -> float:
@@ -150,36 +144,27 @@ class Cover:
         h^3).
         """
         long = (pitch_m - self.side_m) / self.thickness_m + GIVES
-        shear = self.modulus_pa / (2 * (1 + self.poisson))
-        plate = self.modulus_pa / (1 - self.poisson**2)
+        shear = self.modulus_pa / (2 * (1 + medium.POISSON))
+        plate = self.modulus_pa / (1 - medium.POISSON**2)
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
-    def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Bool: which switches at these places are closed; ``x_m`` and ``y_m`` broadcast."""
+    def pressing(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Pressing:
+        """A body's parts on this cover, over switches of this pitch. Raises CoverError for the model ``patch``, and for
+        a rigid body without foam."""
         if self.model == "patch":
-            return self._covered(loads, x_m, y_m)
-        closed: np.ndarray = self.stress_pa(loads, x_m, y_m) >= self.switch.closing_pa
-        return closed
+            raise CoverError("the model 'patch' knows no force; take 'foam'")
+        layers: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa)]
+        if body.flesh is not None:
+            layers.append(body.flesh)
+        cell = pitch_x_m * pitch_y_m
+        if self.switch.travel_m:
+            layers.append(Spring(self.switch.force_n / self.switch.travel_m / cell, self.switch.travel_m))
+        carries = self.area_m2 / cell if self.cap and self.cap.proud and self.cut else 1.0
+        return Pressing(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)
 
-    def stress_pa(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Normal stress at these places, summed over contacts. Raises CoverError for the model ``patch``."""
-        if self.model == "patch":
-            raise CoverError(f"the model 'patch' knows no stress; take one of {', '.join(MODELS[1:])}")
-        x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
-        stress = np.zeros(x.shape)
-        for load in loads:
-            for part, force in load.shares():
-                stress += self._of_part(part, force, x, y)
-        return stress
-
-    def _of_part(self, part: Part, force_n: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        if self.model == "point":
-            return point.stress_pa(force_n, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
-        if self.model == "hertz" and isinstance(part, Ellipse) and part.half_x_m == part.half_y_m:
-            return hertz.stress_pa(force_n, part.half_x_m, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
-        return _superposed(part, force_n, self.thickness_m, self.within, x, y)
-
-    def _covered(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+    def under(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Bool: which switches at these places are under a contact's shape, as ``patch`` goes; ``x_m`` and ``y_m``
+        broadcast."""
         parts = [part for load in loads for part in load.parts]
         x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
         if self.share is None:
@@ -197,23 +182,8 @@ def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return found
 
 
-def _superposed(
-    part: Part, force_n: float, thickness_m: float, within: str, x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
-    at_x, at_y, shares = part.pressure(thickness_m)
-    places_x, places_y = x.ravel(), y.ravel()
-    stress = np.empty(places_x.shape)
-    block = max(1, BLOCK // len(shares))
-    for start in range(0, len(stress), block):
-        here = slice(start, start + block)
-        distance = np.subtract.outer(places_x[here], at_x) ** 2
-        distance += np.subtract.outer(places_y[here], at_y) ** 2
-        stress[here] = medium.spread(within, np.sqrt(distance) / thickness_m) @ shares
-    return (force_n / thickness_m**2 * stress).reshape(x.shape)
-
-
 MIN_LENGTH_M = 1e-6
-"""Least length; integrals over a layer fail far below it."""
+"""Least length."""
 
 
 def load_cover(path: str | Path) -> Cover | None:
@@ -223,6 +193,8 @@ def load_cover(path: str | Path) -> Cover | None:
 
 def read_cover(values: Any) -> Cover:
     """The cover of a TOML table with the fields of :class:`Cover`, and tables ``switch`` and ``cap``."""
+    if isinstance(values, dict) and "poisson" in values:
+        raise CoverError(f"poisson in [cover] no longer exists; leave it out, the foam's is {medium.POISSON:g}")
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:

@@ -173,7 +173,7 @@ def analog(scene: Scene, seconds: float, skin: Skin, cover: Cover | None, rng: R
 def _elements(skin: Skin, cover: Cover | None) -> Cover:
     if cover is None or cover.model == "patch":
         side = min(skin.pitch_x_mm, skin.pitch_y_mm) * 1e-3
-        return Cover("frictionless", 1e-3, cap=Cap(side), cut=True)
+        return Cover("foam", 1e-3, cap=Cap(side), cut=True)
     return dataclasses.replace(cover, switch=Switch(area_m2=cover.switch.area_m2))
 
 

@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 
 from contactfpga import picture_style as style
 from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel
+from contactfpga.design.cover import medium
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force
 from contactfpga.design.cover.press import SHEAR
 from contactfpga_sim.lab import covers, writer
@@ -31,15 +32,15 @@ FLUSH = 0.8
 
 
 def _flush_face(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("bonded", 5e-3, Switch(force_n))
+    return Cover("foam", 5e-3, Switch(force_n))
 
 
 def _flush_cap(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("bonded", 5e-3, Switch(force_n), cap=Cap(FLUSH * pitch_mm * 1e-3, proud=False))
+    return Cover("foam", 5e-3, Switch(force_n), cap=Cap(FLUSH * pitch_mm * 1e-3, proud=False))
 
 
 def _button(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("frictionless", 5e-3, Switch(force_n), cap=Cap(4e-3))
+    return Cover("foam", 5e-3, Switch(force_n), cap=Cap(4e-3))
 
 
 def _caps(pitch_mm: float, force_n: float) -> Cover:
@@ -109,7 +110,7 @@ def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> 
     foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
     switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
     cells = Cells(
-        Cover("frictionless", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud)), 8, 8, 10e-3, 10e-3
+        Cover("foam", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud)), 8, 8, 10e-3, 10e-3
     )
     errors = []
     for x, y in PLACES_MM:
@@ -129,8 +130,8 @@ def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) ->
     g^4/(32 E h^3).
     """
     gap, thick = pitch_m - cover.side_m, cover.thickness_m
-    shear = cover.modulus_pa / (2 * (1 + cover.poisson))
-    plate = cover.modulus_pa / (1 - cover.poisson**2)
+    shear = cover.modulus_pa / (2 * (1 + medium.POISSON))
+    plate = cover.modulus_pa / (1 - medium.POISSON**2)
     per_pascal = SHEAR * gap**2 / (8 * shear * thick) + gap**4 / (32 * plate * thick**3)
     return proud_m / per_pascal * math.pi / 4 * LENGTH_M * WIDTH_M
 

@@ -60,7 +60,7 @@ pitch_y_mm = 10.0
 surface = "cylinder"
 radius_mm = {1e3 * RADIUS_M}
 [cover]
-model = "frictionless"
+model = "foam"
 thickness_m = 0.003
 [cover.cap]
 side_m = 0.0098

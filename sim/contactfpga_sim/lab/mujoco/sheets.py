@@ -28,7 +28,7 @@ LEAD_S = 0.01
 LOOK_S = 2.5e-4
 """Boards' step before MuJoCo's first."""
 
-COVER = Cover(model="hertz")
+COVER = Cover("foam")
 """Cover of a Skin file without ``[cover]``."""
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Swing
@@ -51,8 +52,10 @@ APPROACH_MM_S = (50.0, 250.0)
 """Speeds of approach, up to the reduced speed of ISO 10218-1: chosen."""
 
 
-def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """:func:`placements` with rising forces: all contacts touch at 0 s and approach at one speed, drawn from
+def touches(
+    family: str, count: int, seed: int, skin: Skin, cover: Cover | None = None, first: int = 0, **options: Any
+) -> list[Scene]:
+    """:func:`placements` with rising forces on a cover: all contacts touch at 0 s and come at one speed, drawn from
     :data:`APPROACH_MM_S`, until ``settled_s``."""
     name = zlib.crc32(family.encode())
     scenes = placements(family, count, seed, skin, first, **options)
@@ -60,14 +63,15 @@ def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **op
         float(np.random.default_rng([name, seed, number, 1]).uniform(*APPROACH_MM_S))
         for number in range(first, first + count)
     )
-    return [scene.approaching(speed) for scene, speed in zip(scenes, speeds, strict=True)]
+    return [scene.approaching(speed).on_cover(skin, cover) for scene, speed in zip(scenes, speeds, strict=True)]
 
 
 def bumper(rng: Random, skin: Skin) -> Scene:
     """An ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
     long = rng.uniform(8, 25)
     shape = contacts.ellipse(long, long * rng.uniform(0.4, 1))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(5, 50)),))
+    angle, force = rng.uniform(0, 180), rng.uniform(5, 50)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="forearm"),))
 
 
 def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scene:
@@ -116,19 +120,22 @@ def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGE
 def palm(rng: Random, skin: Skin) -> Scene:
     """A hand laid flat at any angle, 0.8 to 1.1 times its usual size, 20 to 80 N."""
     shape = contacts.palm(rng.uniform(0.8, 1.1))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 360), force_n=rng.uniform(20, 80)),))
+    angle, force = rng.uniform(0, 360), rng.uniform(20, 80)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="palm"),))
 
 
 def sole(rng: Random, skin: Skin) -> Scene:
     """A bare foot 220 to 280 mm long, within 30 degrees of the columns, 200 to 600 N."""
     shape = contacts.sole(rng.uniform(220, 280))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(-30, 30), force_n=rng.uniform(200, 600)),))
+    angle, force = rng.uniform(-30, 30), rng.uniform(200, 600)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="palm"),))
 
 
 def edge(rng: Random, skin: Skin, width_mm: float = 12.0) -> Scene:
     """A bar 50 to 120 mm long and ``width_mm`` wide at any angle, 10 to 60 N."""
     shape = contacts.edge(rng.uniform(50, 120), width_mm)
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(10, 60)),))
+    angle, force = rng.uniform(0, 180), rng.uniform(10, 60)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="rigid"),))
 
 
 def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
