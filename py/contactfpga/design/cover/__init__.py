@@ -8,7 +8,7 @@ from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.cells import Cells, cells_of
 from contactfpga.design.cover.felt import Felt, Sheet, feel
 from contactfpga.design.cover.hertz import Ball
-from contactfpga.design.cover.layers import BODIES, Body, Pressing
+from contactfpga.design.cover.layers import BODIES, Body, Indentation
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.press import MODELS, Cap, Cover, Load, load_cover
@@ -24,10 +24,10 @@ __all__ = [
     "CoverError",
     "Ellipse",
     "Felt",
+    "Indentation",
     "Load",
     "NoSolution",
     "Part",
-    "Pressing",
     "Rectangle",
     "Sheet",
     "Switch",

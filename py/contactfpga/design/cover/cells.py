@@ -20,7 +20,7 @@ import numpy as np
 
 from contactfpga.design.cover import medium, point
 from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
-from contactfpga.design.cover.layers import Body, Pressing
+from contactfpga.design.cover.layers import Body, Indentation
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.press import Cover, Load
@@ -71,10 +71,10 @@ class Cells:
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
-    def pressing(self, parts: Sequence[Part], body: Body) -> Pressing:
+    def indentation(self, parts: Sequence[Part], body: Body) -> Indentation:
         """A body's parts on these switches' cover."""
         down, across = self._axes
-        return self.cover.pressing(parts, body, across.pitch_m, down.pitch_m)
+        return self.cover.indentation(parts, body, across.pitch_m, down.pitch_m)
 
     def forces_n(self, loads: Sequence[Load]) -> Floats:
         """(rows, columns) force on each switch, summed over loads; below 0 where foam is pulled off."""

@@ -183,7 +183,7 @@ class _Window:
         wanted = [2 * (math.ceil(reach_m / positive("pitch", pitch, "m")) + more) + 1 for _, pitch in sides]
         rows, columns = (min(count, most) for (count, _), most in zip(sides, wanted, strict=True))
         self._cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
-        self._pressing = self._cells.pressing([finger], body)
+        self._indentation = self._cells.indentation([finger], body)
 
     def closing_n(self, closing_n: Floats, x_m: float, y_m: float, angle_rad: float) -> tuple[Floats, float]:
         """(sheets,) force at this place that closes the first switch of each sheet with (sheets, rows, columns) closing
@@ -208,7 +208,7 @@ class _Window:
         return least.min(axis=(1, 2), initial=math.inf, where=pressed), float(shares.flat[first])
 
     def _shares(self, force_n: float, x_m: float, y_m: float, angle_rad: float) -> Floats:
-        parts = self._pressing.parts_at(self._pressing.depth_m(force_n))
+        parts = self._indentation.parts_at(self._indentation.depth_m(force_n))
         return self._cells.forces_n([Load(tuple(part.placed(x_m, y_m, angle_rad) for part in parts), 1.0)])
 
     @staticmethod

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.design.cover import medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
-from contactfpga.design.cover.layers import Body, Layer, Pressing, Spring
+from contactfpga.design.cover.layers import Body, Indentation, Layer, Spring
 from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.point import Switch
 from contactfpga.inputs import tomlfile
@@ -148,7 +148,7 @@ class Cover:
         plate = self.modulus_pa / (1 - medium.POISSON**2)
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
-    def pressing(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Pressing:
+    def indentation(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Indentation:
         """A body's parts on this cover, over switches of this pitch. Raises CoverError for the model ``patch``, and for
         a rigid body without foam."""
         if self.model == "patch":
@@ -160,7 +160,7 @@ class Cover:
         if self.switch.travel_m:
             layers.append(Spring(self.switch.force_n / self.switch.travel_m / cell, self.switch.travel_m))
         carries = self.area_m2 / cell if self.cap and self.cap.proud and self.cut else 1.0
-        return Pressing(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)
+        return Indentation(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)
 
     def under(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Bool: which switches at these places are under a contact's shape, as ``patch`` goes; ``x_m`` and ``y_m``

@@ -1,4 +1,4 @@
-"""Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
+"""Distance of a zone's barycenter from the indentation body under a known cover, by the number of cells and the push.
 
 The same push closes one switch in the middle of a cell, and several between cells.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from contactfpga.design.cover import BODIES, Cells, Cover, Load
 
 RADII_M = (0.005, 0.01, 0.02)
-"""R* of pressing balls, equally often: a pencil's end, a fingertip, a thumb."""
+"""R* of indentation balls, equally often: a pencil's end, a fingertip, a thumb."""
 
 SIDE = 6
 """Places along each side of a quarter cell."""
@@ -32,7 +32,7 @@ class Pressed:
         self._cells = Cells(cover, LINES, LINES, pitch_x_m, pitch_y_m)
         self._pitches_m = pitch_x_m, pitch_y_m
         rigid = BODIES["rigid"]
-        self._balls = [self._cells.pressing([rigid.ball(radius)], rigid) for radius in RADII_M]
+        self._balls = [self._cells.indentation([rigid.ball(radius)], rigid) for radius in RADII_M]
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:

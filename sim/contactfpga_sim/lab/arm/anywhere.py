@@ -48,7 +48,7 @@ def _proud(side_mm: Callable[[float], float]) -> Callable[[float, float], dict[s
 
     def changes(pitch_mm: float, force_n: float) -> dict[str, Any]:
         cap = {"side_m": 1e-3 * side_mm(pitch_mm)}
-        return {"model": "frictionless", "switch": {"force_n": force_n, **dome}, "cap": cap}
+        return {"model": "foam", "switch": {"force_n": force_n, **dome}, "cap": cap}
 
     return changes
 
@@ -57,7 +57,7 @@ BUTTON_MM = 3.5
 _CAP = _proud(lambda pitch_mm: pitch_mm - covers.GAP_MM)
 FACES: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "flush, point force": _flush("point"),
-    "flush": _flush("hertz"),
+    "flush": _flush("foam"),
     "buttons": _proud(lambda pitch_mm: BUTTON_MM),
     "caps": _CAP,
     "tiles": _CAP,

@@ -106,31 +106,47 @@ class Control(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Foam(_Checked):
-    """The cover: F = K_s delta^1.5 (1 + damping d delta/dt), on a stiff base."""
+    """The cover, with losses F (1 + damping d delta/dt)."""
 
     modulus_pa: float
-    poisson: float
     radius_m: float
+    """R* of the arm on what it runs into."""
     thickness_m: float
+    poisson: float = 0.5
+    """For the paper's half-space."""
     damping: float = 0.0
     """Damping in s/m, after Hunt and Crossley; 0: lossless."""
     base_n_m: float = 1e6
-    """Base, added once the foam is pressed flat."""
+    """Base under the half-space, added once it is pressed flat."""
     cut: bool = False
-    """Whether foam is cut into tiles; the plant's spring stays that of whole foam."""
+    """Whether foam is cut into tiles."""
     _zero = ("damping",)
 
     @functools.cached_property
-    def stiffness(self) -> float:
-        """K_s in N/m^1.5."""
-        return elastic.stiffness(Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson)))
+    def half_space(self) -> HalfSpace:
+        """The paper's spring."""
+        ball = Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson))
+        return HalfSpace(elastic.stiffness(ball), self.thickness_m, self.base_n_m)
 
-    def force_n(self, indentation_m: float, rate_m_s: float = 0.0) -> float:
-        """Force at an indentation that grows by ``rate_m_s``; never negative."""
-        if indentation_m <= 0:
+
+@dataclasses.dataclass(frozen=True)
+class HalfSpace:
+    """The paper's spring F = K_s delta^1.5, in which the thickness has no effect until it is pressed flat on a base."""
+
+    stiffness: float
+    """K_s in N/m^1.5."""
+    thickness_m: float
+    base_n_m: float
+
+    def force_n(self, depth_m: float) -> float:
+        """Force at an indentation."""
+        if depth_m <= 0:
             return 0.0
-        force = self.stiffness * indentation_m * math.sqrt(indentation_m) * (1 + self.damping * rate_m_s)
-        return max(0.0, force) + self.base_n_m * max(0.0, indentation_m - self.thickness_m)
+        return self.stiffness * depth_m * math.sqrt(depth_m) + self.base_n_m * max(0.0, depth_m - self.thickness_m)
+
+    def depth_m(self, force_n: float) -> float:
+        """Indentation at a force, above the base."""
+        return float((force_n / self.stiffness) ** (2 / 3))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -143,5 +143,5 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
 
 def naive_speed(case: Case, limit_n: float, latency: float) -> float:
     """(delta(limit) - delta(closing)) / latency; unsafe, as the arm presses on after the reaction."""
-    depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
+    depth = [case.foam.half_space.depth_m(force) for force in (limit_n, closing_n(case))]
     return max(0.0, depth[0] - depth[1]) / latency

@@ -58,7 +58,7 @@ FAILURES = (
     Failure("halfway between four switches", {"touch": (HALFWAY,)}),
     Failure("that, 0.1 m from the joint", {"touch": (HALFWAY | {"lever_m": 0.1},)}),
     Failure("two contacts, one on a switch, one halfway", {"touch": ({}, {"x_mm": 25.0, "y_mm": 25.0})}),
-    Failure("the patch's pressure, not a point force", {"model": "hertz"}),
+    Failure("the patch's pressure, not a point force", {"model": "foam"}),
     Failure("0.6 m/s: pressed flat", {"link": {"speed_m_s": 0.6}}),
     Failure("0.6 m/s, torque limit alone", {"link": {"speed_m_s": 0.6}}, "torque"),
     Failure("bounce of 8 ms, nobody waits", {"switch": BOUNCING, "control": {"clear_s": 0.0}}),

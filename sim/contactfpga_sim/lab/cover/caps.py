@@ -13,8 +13,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel
-from contactfpga.design.cover import medium
+from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel, medium
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force
 from contactfpga.design.cover.press import SHEAR
 from contactfpga_sim.lab import covers, writer
@@ -109,9 +108,7 @@ def elements_table() -> str:
 def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> float:
     foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
     switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
-    cells = Cells(
-        Cover("foam", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud)), 8, 8, 10e-3, 10e-3
-    )
+    cells = Cells(Cover("foam", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud)), 8, 8, 10e-3, 10e-3)
     errors = []
     for x, y in PLACES_MM:
         exact = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)).max()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Cover, Ellipse, Load, cells_of, elastic
+from contactfpga.design.cover import Body, Cover, Load, cells_of
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, ReadTimeout
 from contactfpga.robot.body.plan import Plan
@@ -36,10 +36,11 @@ class WornSheet:
 
     board: Board
 
-    def __init__(self, plan: Plan, cover: Cover, radius_m: float, bridge: BridgeSettings, golden: bool, seed: int):
+    def __init__(
+        self, plan: Plan, cover: Cover, radius_m: float, body: Body, bridge: BridgeSettings, golden: bool, seed: int
+    ):
         skin = self.skin = plan.skin
         self.plan = plan
-        self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
         self.fingers: tuple[Finger, ...] = ()
         self.contact = False
@@ -49,6 +50,7 @@ class WornSheet:
         """Transforms each packet of the USB chip; if it raises :class:`~contactfpga.PortLost`, the plug is pulled."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
+        self.indentation = self._cells.indentation([body.ball(radius_m)], body)
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
         """(rows, columns) force in N on each switch."""
         self.closed = np.zeros((skin.rows, skin.columns), bool)
@@ -102,11 +104,11 @@ class WornSheet:
         for touch in self.touches:
             if touch.x_mm is None or touch.y_mm is None or touch.push_n <= 0:
                 continue
-            radius = self.ball.patch_m(touch.push_n)
+            parts = self.indentation.parts_at(self.indentation.depth_m(touch.push_n))
             turns = (-1, 0, 1) if self.skin.closed else (0,)  # pressed over the seam, too
             for turn in turns:
                 x_m = 1e-3 * touch.x_mm + turn * around_m(self.skin)
-                found.append(Load((Ellipse(radius, radius, x_m, 1e-3 * touch.y_mm),), touch.push_n))
+                found.append(Load(tuple(part.placed(x_m, 1e-3 * touch.y_mm, 0.0) for part in parts), touch.push_n))
         return found
 
     def _load(self) -> None:

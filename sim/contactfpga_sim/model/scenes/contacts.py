@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Load, Part, Pressing, Rectangle
+from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Indentation, Load, Part, Rectangle
 from contactfpga.design.cover.layers import Layer
 
 Value = float | Callable[[float], float]
@@ -107,18 +107,18 @@ class Contact:
         bare = cover is None or cover.model == "patch"
         if bare and self.speed_mm_s is None:
             return dataclasses.replace(self, body=None)
-        pressing = _pressing(None if bare else cover, self.shape, body, *pitch)
-        full_m: Value = body.depth_m if bare else PressedDepth(pressing, self.force_n)
+        indentation = _indentation(None if bare else cover, self.shape, body, *pitch)
+        full_m: Value = body.depth_m if bare else PressedDepth(indentation, self.force_n)
         if not bare and not callable(self.force_n):
-            full_m = pressing.depth_m(self.force_n)
+            full_m = indentation.depth_m(self.force_n)
         if self.speed_mm_s is None:
-            shape = PressedParts(pressing, full_m)
+            shape = PressedParts(indentation, full_m)
             return dataclasses.replace(self, body=None, shape=shape if callable(full_m) else shape(0.0))
         if callable(full_m):
             raise ValueError("the contact has a force of its own over time; it cannot approach as well")
         depth_m = Approach(full_m, self.speed_mm_s * M)
-        force = PressedForce(pressing, depth_m, at(self.force_n, 0.0) / max(pressing.force_n(full_m), 1e-300))
-        return dataclasses.replace(self, body=None, shape=PressedParts(pressing, depth_m), force_n=force)
+        force = PressedForce(indentation, depth_m, at(self.force_n, 0.0) / max(indentation.force_n(full_m), 1e-300))
+        return dataclasses.replace(self, body=None, shape=PressedParts(indentation, depth_m), force_n=force)
 
     def load(self, seconds: float) -> Load | None:
         """Load on the cover at a time; None without contact."""
@@ -171,12 +171,12 @@ def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape
 
 
 @functools.lru_cache(maxsize=4096)
-def _pressing(cover: Cover | None, parts: Shape, body: Body, pitch_x_m: float, pitch_y_m: float) -> Pressing:
+def _indentation(cover: Cover | None, parts: Shape, body: Body, pitch_x_m: float, pitch_y_m: float) -> Indentation:
     if cover is not None:
-        return cover.pressing(parts, body, pitch_x_m, pitch_y_m)
+        return cover.indentation(parts, body, pitch_x_m, pitch_y_m)
     flesh = body.flesh or BODIES["finger"].flesh
     assert flesh is not None
-    return Pressing(parts, body.depth_m, [Layer(2 * body.depth_m, flesh.modulus_pa)])
+    return Indentation(parts, body.depth_m, [Layer(2 * body.depth_m, flesh.modulus_pa)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -199,34 +199,34 @@ class Approach:
 class PressedDepth:
     """Depth in m of a body under a changing force."""
 
-    pressing: Pressing
+    indentation: Indentation
     force_n: Value
 
     def __call__(self, seconds: float) -> float:
-        return self.pressing.depth_m(at(self.force_n, seconds))
+        return self.indentation.depth_m(at(self.force_n, seconds))
 
 
 @dataclasses.dataclass(frozen=True)
 class PressedForce:
     """Force of a body at a changing depth, times ``scale``."""
 
-    pressing: Pressing
+    indentation: Indentation
     depth_m: Value
     scale: float
 
     def __call__(self, seconds: float) -> float:
-        return self.scale * self.pressing.force_n(at(self.depth_m, seconds))
+        return self.scale * self.indentation.force_n(at(self.depth_m, seconds))
 
 
 @dataclasses.dataclass(frozen=True)
 class PressedParts:
     """Parts of a body at a depth, which may change."""
 
-    pressing: Pressing
+    indentation: Indentation
     depth_m: Value
 
     def __call__(self, seconds: float) -> Shape:
-        return self.pressing.parts_at(max(SHALLOWEST_M, at(self.depth_m, seconds)))
+        return self.indentation.parts_at(max(SHALLOWEST_M, at(self.depth_m, seconds)))
 
 
 SHALLOWEST_M = 1e-9
