@@ -153,7 +153,7 @@ class Cells:
             2 * np.pi * np.fft.rfftfreq(len(across.places_m), across.step_m),
         )
         number = np.hypot(waves[0][:, None], waves[1])
-        return medium.transfer("foam", number * self.cover.thickness_m)
+        return medium.foam(number * self.cover.thickness_m)
 
     def _given_way(self, taken: Floats) -> Floats:
         down, across = self._axes

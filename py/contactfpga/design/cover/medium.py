@@ -11,9 +11,6 @@ s^2)^(-5/2).
 ``bonded``: an incompressible cover glued to a rigid base. The stream function obeys (D^2 - 1)^2 W = 0 over the depth,
 without shear on the face or displacement at the base: G = (cosh t + t sinh t) / (cosh^2 t + t^2).
 
-``foam``: a cover with the Poisson ratio nu = 0.2 glued to a rigid base, with q = 3 - 4 nu: G = (1 + q) ((1 + q) cosh t
-2 t sinh t) / (2 q cosh 2t + 4 t^2 + 1 + q^2), which is ``bonded`` at nu = 0.5.
-
 ``frictionless``: a cover that slides on a rigid base, for any Poisson ratio: G = (sinh t + t cosh t) / (sinh t cosh t +
 t).
 """
@@ -28,7 +25,7 @@ from contactfpga.design.cover.answer import CoverError
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.inputs.values import shown
 
-MEDIA = ("halfspace", "bonded", "foam", "frictionless")
+MEDIA = ("halfspace", "bonded", "frictionless")
 
 POISSON = 0.2
 """Poisson's ratio of foam."""
@@ -51,18 +48,25 @@ def transfer(name: str, t: Floats) -> Floats:
     t = np.asarray(t, float)
     if name == "halfspace":
         return np.asarray((1 + t) * np.exp(-t))
-    # All fractions are divided by cosh t through, so that nothing overflows.
+    # Both fractions are divided by cosh t through, so that nothing overflows.
     tanh, sech = np.tanh(t), 2 * np.exp(-t) / (1 + np.exp(-2 * t))
     if name == "bonded":
         return np.asarray(sech * (1 + t * tanh) / (1 + (t * sech) ** 2))
-    if name == "foam":
-        q = 3 - 4 * POISSON
-        bound = (1 + q**2 + 4 * t**2) * sech**2 / 4 + q * (1 + tanh**2) / 2
-        return np.asarray((1 + q) * ((1 + q) + 2 * t * tanh) * sech / 4 / bound)
     if name == "frictionless":
         moving = t > 0
         return np.where(moving, sech * (tanh + t) / np.where(moving, tanh + t * sech**2, 1.0), 1.0)
     raise CoverError(f"medium is {shown(name)}; it must be one of {', '.join(MEDIA)}")
+
+
+def foam(t: Floats) -> Floats:
+    """G(t) of foam glued to a rigid base, for t from 0 to some hundred.
+
+    With q = 3 - 4 nu, G = (1 + q) ((1 + q) cosh t + 2 t sinh t) / (2 q cosh 2t + 4 t^2 + 1 + q^2); ``bonded`` is this
+    at nu = 0.5.
+    """
+    q, tanh, sech = 3 - 4 * POISSON, np.tanh(t), 2 * np.exp(-t) / (1 + np.exp(-2 * t))
+    below = 2 * q * (1 + tanh**2) + (1 + q**2 + 4 * t**2) * sech**2
+    return np.asarray((1 + q) * (1 + q + 2 * t * tanh) * sech / below)
 
 
 def spread(name: str, s: Floats | float) -> Floats:
