@@ -17,7 +17,7 @@ def touched():
     rng, cells, found = np.random.default_rng(1), Cells(TILES, 9, 9, PITCH, PITCH), []
     rigid = BODIES["rigid"]
     balls = [cells.indentation([rigid.ball(radius)], rigid) for radius in RADII_M]
-    for _ in range(600):
+    for _ in range(1200):
         x, y = rng.uniform(3.5, 4.5, 2) * PITCH
         ball = balls[rng.integers(3)]
         (part,) = ball.parts_at(ball.depth_m(5.0))

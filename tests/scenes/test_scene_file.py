@@ -166,7 +166,10 @@ def test_what_a_file_says_is_what_is_read(load):
         ("[[contact]]\n", "contact 1: shape is None; it must be one of disc, ellipse, edge, palm, sole"),
         ('[[contact]]\nshape = "cube"', "contact 1: shape is 'cube'; it must be one of disc"),
         ('[[contact]]\nshape = "disc"', "contact 1: radius_mm is missing"),
-        (DISC + "length_mm = 3", "contact 1, a disc, has the key 'length_mm'; known are radius_mm, shape, body, number"),
+        (
+            DISC + "length_mm = 3",
+            "contact 1, a disc, has the key 'length_mm'; known are radius_mm, shape, body, number",
+        ),
         (DISC.replace("10", "0"), "contact 1: radius_mm is 0; it must lie between 0.01 and 100000"),
         (DISC.replace("10", "[9, 8]"), "contact 1: radius_mm is [9, 8]; the least comes first"),
         (DISC.replace("10", "[1, 2, 3]"), "contact 1: radius_mm is [1, 2, 3]; it must be a number or [least, most]"),

@@ -68,7 +68,7 @@ def test_the_floor_of_a_disc_of_known_size_is_that_of_an_integral(radius):
 def test_no_method_lies_below_the_floor_but_one_that_cheats(pitch):
     skin, cover = Skin(pitch_x_mm=pitch, pitch_y_mm=pitch), tiled(pitch)
     got = floor("finger", skin, cover, 800, 7)
-    sheet, scenes = inner("finger", skin, 800, 7)
+    sheet, scenes = inner("finger", skin, None, 800, 7)
     looks = [(scene, cells) for scene in scenes if (cells := scene.pressed(0.0, sheet, cover)).any()]
     for settings in (
         {},
@@ -110,7 +110,7 @@ def zones_of(cells, pitch):
 def test_a_table_of_other_scenes_reaches_the_floor_where_the_size_is_known():
     cover = tiled(10.0)
     table = place_table("finger", TEN, cover, 800, 8, **FINGER)
-    sheet, scenes = inner("finger", TEN, 800, 9, **FINGER)
+    sheet, scenes = inner("finger", TEN, None, 800, 9, **FINGER)
     by_table, by_barycenter = [], []
     for scene in scenes:
         (zone,) = zones_of(scene.pressed(0.0, sheet, cover), 10.0)

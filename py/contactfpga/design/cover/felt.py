@@ -13,7 +13,7 @@ from collections.abc import Collection
 import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, NoSolution, positive
-from contactfpga.design.cover.cells import BEYOND, Cells
+from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.layers import BODIES, Body
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Ellipse
@@ -28,9 +28,6 @@ ROUNDS, APART, LEAST_RISE = 3, 1.25, 0.2
 """Estimates of the force from the shares at the estimate before; ratio of the forces that tell the power, and its
 least."""
 
-GROWN = 1.5
-"""Half axes at the largest force that is looked at, over those at the body's depth."""
-
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
 """Drawn sheets, if closing forces have a spread; another sheet lies within their range with 39/41 (95 %)
@@ -38,9 +35,6 @@ probability."""
 
 LEAST_SHARE = 1e-4
 """Force share that counts as unpressed; a layer's linear solution has ripples far away."""
-
-NEIGHBORS = 2
-"""Computed switches beyond finger and foam, as yielding caps pass force on."""
 
 _STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
 """Steps of a sequence that fills a cube evenly (Roberts): powers of the root of x^4 = x + 1."""
@@ -118,11 +112,11 @@ def feel(
         raise CoverError(f"places is {places}; it must lie between 1 and {MOST_PLACES}")
     whole = _cells(cover, sheet, seed)
     closing = _closing(cover, sheet, whole, seed)
-    window = _Window(cover, sheet, Ellipse(*half), body)
+    touch = Touch(whole, Ellipse(*half), body, sheet.columns * sheet.pitch_x_m if sheet.closed else 0.0)
     at = spread_evenly(places, sheet)
     forces, shares = np.empty((len(closing), places)), np.empty(places)
     for number, place in enumerate(at):
-        forces[:, number], shares[number] = window.closing_n(closing, *place.tolist())
+        forces[:, number], shares[number] = touch.closing_n(closing, *place.tolist())
     worst = int(np.median(forces, axis=0).argmax())
     half_n, most_n, worst_n = (
         _force(np.quantile(forces, part, axis=1, method="inverted_cdf"), part) for part in (0.5, 0.99, 1.0)
@@ -171,47 +165,35 @@ def _touches(part: float) -> str:
     return f"more than {100 * (1 - part):.3g} % of touches" if part < 1 else "some touches"
 
 
-class _Window:
-    """The switches around a finger, of which more do not matter."""
+class Touch:
+    """A finger on a sheet. ``around_m``: length of a closed sheet along its columns, 0 of a flat one."""
 
-    def __init__(self, cover: Cover, sheet: Sheet, finger: Ellipse, body: Body):
-        self.sheet = sheet
-        beyond = 0.0 if cover.cut else BEYOND * cover.thickness_m
-        more = NEIGHBORS + 2 if cover.gives_way else 1
-        reach_m = GROWN * max(finger.half_x_m, finger.half_y_m) + beyond
-        sides = [(sheet.rows, sheet.pitch_y_m), (sheet.columns, sheet.pitch_x_m)]
-        wanted = [2 * (math.ceil(reach_m / positive("pitch", pitch, "m")) + more) + 1 for _, pitch in sides]
-        rows, columns = (min(count, most) for (count, _), most in zip(sides, wanted, strict=True))
-        self._cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
-        self._indentation = self._cells.indentation([finger], body)
+    def __init__(self, cells: Cells, finger: Ellipse, body: Body, around_m: float = 0.0):
+        self._cells, self._indentation, self._around_m = cells, cells.indentation([finger], body), around_m
 
     def closing_n(self, closing_n: Floats, x_m: float, y_m: float, angle_rad: float) -> tuple[Floats, float]:
         """(sheets,) force at this place that closes the first switch of each sheet with (sheets, rows, columns) closing
         forces, and that switch's share on the first sheet."""
-        sheet, (high, wide) = self.sheet, self._cells.shape
-        top = self._start(y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
-        left = self._start(x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)
-        needed = closing_n[:, top + np.arange(high)[:, None], (left + np.arange(wide)) % sheet.columns]
-        place = x_m - left * sheet.pitch_x_m, y_m - top * sheet.pitch_y_m, angle_rad
-        force = 1.0
+        force, place = 1.0, (x_m, y_m, angle_rad)
         for _ in range(ROUNDS):
             shares = self._shares(force, *place)
             pressed = shares > LEAST_SHARE
-            force = float((needed[0] / np.where(pressed, shares, np.nan)).min(initial=math.inf, where=pressed))
+            force = float((closing_n[0][pressed] / shares[pressed]).min(initial=math.inf))
             if not math.isfinite(force):
-                return np.full(len(needed), math.inf), 0.0
+                return np.full(len(closing_n), math.inf), 0.0
         shares, more = (self._shares(part * force, *place) for part in (1.0, APART))
         pressed = (shares > LEAST_SHARE) & (more > LEAST_SHARE)
-        rises = 1 + np.log(np.where(pressed, more / np.where(pressed, shares, 1.0), 1.0)) / math.log(APART)
-        least = force * (needed / (force * np.where(pressed, shares, np.nan))) ** (1 / np.maximum(rises, LEAST_RISE))
-        first = int(np.where(pressed, least[0], math.inf).argmin())
-        return least.min(axis=(1, 2), initial=math.inf, where=pressed), float(shares.flat[first])
+        if not pressed.any():
+            return np.full(len(closing_n), math.inf), 0.0
+        near, more, needed = shares[pressed], more[pressed], closing_n[:, pressed]
+        rises = np.maximum(1 + np.log(more / near) / math.log(APART), LEAST_RISE)
+        least = force * (needed / (force * near)) ** (1 / rises)
+        return least.min(axis=1, initial=math.inf), float(near[least[0].argmin()])
 
     def _shares(self, force_n: float, x_m: float, y_m: float, angle_rad: float) -> Floats:
         parts = self._indentation.parts_at(self._indentation.depth_m(force_n))
-        return self._cells.forces_n([Load(tuple(part.placed(x_m, y_m, angle_rad) for part in parts), 1.0)])
-
-    @staticmethod
-    def _start(middle: float, width: int, count: int, closed: bool) -> int:
-        first = round(middle) - width // 2
-        return first if closed else min(max(first, 0), count - width)
+        turns = (-1, 0, 1) if self._around_m else (0,)
+        loads = [
+            Load((part.placed(x_m + turn * self._around_m, y_m, angle_rad),), 1.0) for part in parts for turn in turns
+        ]
+        return self._cells.forces_n(loads)

@@ -21,7 +21,9 @@ from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "foam", "point")
 """``patch``: a switch closes under the contact's shape, whatever the force. ``foam``: body and foam are pressed as
-layers (:mod:`contactfpga.design.cover.layers`), and whole foam spreads the pressure (:func:`contactfpga.design.cover.medium.foam`). ``point``: each part's force acts at its middle on a half-space, paper (9)."""
+layers (:mod:`contactfpga.design.cover.layers`), and whole foam spreads the pressure
+(:func:`contactfpga.design.cover.medium.foam`). ``point``: each part's force acts at its middle on a half-space, paper
+(9)."""
 
 GONE = ("hertz", "bonded", "frictionless")
 """Models of earlier versions."""

@@ -56,7 +56,7 @@ def rivals(families: Sequence[str], count: int, seed: int) -> list[RivalMethod]:
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=PITCH_MM, pitch_y_mm=PITCH_MM, connectivity=4)
     found = []
     for family, (name, rival) in itertools.product(families, RIVALS.items()):
-        scenes, rng = touches(family, count, seed, skin), np.random.default_rng(seed)
+        scenes, rng = touches(family, count, seed, skin, cover), np.random.default_rng(seed)
         each = [rival.errors(scene, skin, cover) for scene in scenes]
         times = [rival.time_us(scene, skin, cover, rng) for scene in scenes]
         means = {metric: errors.interval([float(getattr(one, metric)) for one in each]) for metric in errors.METRICS}

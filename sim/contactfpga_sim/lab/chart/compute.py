@@ -138,11 +138,12 @@ def timing(task: Task, first: int) -> Raw:
 
 
 def _touches(task: Task, first: int) -> list[Scene]:
-    return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, first=first)
+    return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, task.cover, first=first)
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
+    on = scene.on_cover(skin, cover)
+    return on.pressed(seconds, skin, cover), errors.contacts(on.truth(seconds, skin))
 
 
 def compared(looks: Iterable[Look], skin: Skin) -> Found:

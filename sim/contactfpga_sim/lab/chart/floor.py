@@ -72,7 +72,7 @@ class Seen:
 def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> Floor:
     """Floor of ``count`` scenes of a family in :data:`ONE`, by the Skin's pitch and connectivity; cover None is a
     bare sheet. Raises ValueError."""
-    sheet, scenes = inner(family, skin, count, seed, **options)
+    sheet, scenes = inner(family, skin, cover, count, seed, **options)
     pitch = np.array([skin.pitch_x_mm, skin.pitch_y_mm])
     cells = [scene.pressed(scene.settled_s, sheet, cover) for scene in scenes]
     felt = [(scene, one) for scene, one in zip(scenes, cells, strict=True) if one.any()]
@@ -95,7 +95,7 @@ def floor(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, *
 
 def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any) -> PlaceTable:
     """The table of :func:`floor`'s scenes, by which a host places zones."""
-    sheet, scenes = inner(family, skin, count, seed, **options)
+    sheet, scenes = inner(family, skin, cover, count, seed, **options)
     cells = [(scene, scene.pressed(scene.settled_s, sheet, cover)) for scene in scenes]
     found = seen([(scene, one) for scene, one in cells if one.any()], sheet)
     if not len(found.offsets):
@@ -105,7 +105,9 @@ def place_table(family: str, skin: Skin, cover: Cover | None, count: int, seed: 
     return PlaceTable(pitch, keys, _learned(found.offsets * pitch, numbered(found.moments), len(keys)))
 
 
-def inner(family: str, skin: Skin, count: int, seed: int, **options: Any) -> tuple[Skin, list[Scene]]:
+def inner(
+    family: str, skin: Skin, cover: Cover | None, count: int, seed: int, **options: Any
+) -> tuple[Skin, list[Scene]]:
     if family not in ONE:
         raise ValueError(f"family {family!r} has no floor here; take one of {', '.join(ONE)}")
     contacts = [scene.contacts[0] for scene in placements(family, count, seed, skin, **options)]
@@ -118,7 +120,8 @@ def inner(family: str, skin: Skin, count: int, seed: int, **options: Any) -> tup
         connectivity=skin.connectivity, settle_us=20.0,
     )  # fmt: skip
     places = (margin - 0.5 + INNER * np.random.default_rng([seed, 1]).random((count, 2))) * pitch
-    return sheet, [_moved(one, *map(float, place)) for one, place in zip(contacts, places, strict=True)]
+    moved = (_moved(one, *map(float, place)) for one, place in zip(contacts, places, strict=True))
+    return sheet, [scene.on_cover(sheet, cover) for scene in moved]
 
 
 def _moved(contact: Contact, x_mm: float, y_mm: float) -> Scene:

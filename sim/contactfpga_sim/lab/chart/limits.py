@@ -92,7 +92,7 @@ def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
     lines = round(EXTENT_MM / pitch_mm)
     # On tiles of their own, cells that share a corner only are not joined.
     skin = Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, connectivity=4)
-    scenes = touches("fingers", count, 0, skin)
+    scenes = touches("fingers", count, 0, skin, cover)
     rng = np.random.default_rng(0)
     found = [rival.errors(scene, skin, cover) for scene in scenes]
     times = np.array([rival.time_us(scene, skin, cover, rng) for scene in scenes]) / 1e3

@@ -21,9 +21,9 @@ from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
-from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force, Sheet, feel
+from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel
 from contactfpga.design.cover.patch import Ellipse
-from contactfpga.design.cover.press import Cover, Load
+from contactfpga.design.cover.press import Cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
@@ -229,14 +229,9 @@ def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
     if not seed:
         cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
     cells = Cells(cover, AROUND, AROUND, pitch_m, pitch_m, seed)
-    middle = AROUND // 2 * pitch_m
-    found = []
-    for x, y in PLACES:
-        finger = Ellipse(LENGTH_M / 2, WIDTH_M / 2, middle + x * pitch_m, middle + y * pitch_m, 0.0)
-        taken = cells.forces_n([Load((finger,), 1.0)])
-        with np.errstate(divide="ignore"):
-            found.append(cells.thresholds_n / np.where(taken > 0, taken, np.nan))
-    return np.nanmin(np.array(found), axis=(1, 2))
+    middle, touch = AROUND // 2 * pitch_m, Touch(cells, Ellipse(LENGTH_M / 2, WIDTH_M / 2), BODY)
+    places = ((middle + x * pitch_m, middle + y * pitch_m, 0.0) for x, y in PLACES)
+    return np.array([touch.closing_n(cells.thresholds_n[None], *place)[0][0] for place in places])
 
 
 def main(argv: Sequence[str] | None = None) -> int:
