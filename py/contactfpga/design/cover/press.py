@@ -154,14 +154,19 @@ class Cover:
         a rigid body without foam."""
         if self.model == "patch":
             raise CoverError("the model 'patch' knows no force; take 'foam'")
-        layers: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa)]
-        if body.flesh is not None:
-            layers.append(body.flesh)
-        cell = pitch_x_m * pitch_y_m
-        if self.switch.travel_m:
-            layers.append(Spring(self.switch.force_n / self.switch.travel_m / cell, self.switch.travel_m))
-        carries = self.area_m2 / cell if self.cap and self.cap.proud and self.cut else 1.0
+        carries = self.area_m2 / (pitch_x_m * pitch_y_m) if self.cut else 1.0
+        layers = self.layers(body, pitch_x_m, pitch_y_m)
         return Indentation(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)
+
+    def layers(self, body: Body, pitch_x_m: float, pitch_y_m: float) -> list[Layer | Spring]:
+        """Foam, the body's flesh and the switches' travel, of those that there are."""
+        switch, cell = self.switch, pitch_x_m * pitch_y_m
+        found: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa)]
+        if body.flesh is not None:
+            found.append(body.flesh)
+        if switch.travel_m:
+            found.append(Spring(switch.force_n / switch.travel_m / cell, switch.travel_m))
+        return found
 
     def under(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Bool: which switches at these places are under a contact's shape, as ``patch`` goes; ``x_m`` and ``y_m``
