@@ -12,9 +12,10 @@ from contactfpga.design.cover import drawing, elastic, impact, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import GRAVITY, Arm
 from contactfpga.design.cover.design import thinning
+from contactfpga.design.cover.foams import FOAMS
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
-from contactfpga.design.cover.task import FIRST_DESIGN, FOAMS, WORST_M
+from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.cover import caps, formulas
 
