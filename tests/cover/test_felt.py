@@ -1,5 +1,6 @@
 """Whether a light finger is felt: the function and the command `contactfpga cover felt`."""
 
+import dataclasses
 import itertools
 import json
 
@@ -125,6 +126,39 @@ def test_between_small_faces_far_apart_no_force_is_felt():
     assert str(found.most) == "no solution: more than 1 % of touches close no switch, whatever their force"
 
 
+KIT = Cover("foam", 2e-3, Switch(0.4, travel_m=2e-4, spread=0.1, preload_n=0.05), cap=Cap(5.8e-3), cut=True)
+HALVES = {
+    **{name: {name: getattr(KIT, name) / 2} for name in ("thickness_m", "modulus_pa")},
+    **{
+        name: {"switch": {name: getattr(KIT.switch, name) / 2}}
+        for name in ("force_n", "travel_m", "preload_n", "spread")
+    },
+    "side_m": {"cap": {"side_m": 2.9e-3}},
+    "cut": {"cut": False, "switch": {"travel_m": 0.0}},
+}
+
+
+@pytest.mark.parametrize("changes", HALVES.values(), ids=HALVES)
+def test_each_key_changes_an_answer(changes):
+    """Half the value moves by 2 % or more: the force from which a finger is felt or its interval, the way until it is
+    felt, or the force that stops a rigid arm within 1.2 mm."""
+    nested = {
+        name: dataclasses.replace(getattr(KIT, name), **value) if isinstance(value, dict) else value
+        for name, value in changes.items()
+    }
+    usual, other = (answers(cover) for cover in (KIT, dataclasses.replace(KIT, **nested)))
+    assert max(abs(other / usual - 1)) > 0.02
+
+
+def answers(cover):
+    pitch = 6.4e-3
+    half, cells = feel(cover, Sheet(6, 6, pitch, pitch), places=60).half, Cells(cover, 6, 6, pitch, pitch)
+    finger, rigid = BODIES["finger"], BODIES["rigid"]
+    pressed = cells.indentation([Ellipse(6e-3, 5e-3)], finger)
+    stopped = cells.indentation([rigid.ball(0.038)], rigid).force_n(1.2e-3)
+    return np.array([half.value_n, 1 + half.high_n - half.low_n, pressed.depth_m(half.value_n), stopped])
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -146,7 +180,7 @@ def test_the_tiles_feel_two_newtons_anywhere(run):
     status, out, errors = run("felt", TILES, "--places", 500, "--json")
     found = json.loads(out)
     assert (status, errors) == (0, "")
-    assert found["finger"] == {"length_m": 0.012, "width_m": 0.01}
+    assert found["finger"] == {"body": "finger", "length_m": 0.012, "width_m": 0.01}
     assert found["worst"]["high_n"] < 2.0
     assert found["half"]["value_n"] < found["most"]["value_n"] < found["worst"]["value_n"]
     assert (found["places"], found["sheets"]) == (500, 40)
@@ -156,7 +190,11 @@ def test_the_tiles_feel_two_newtons_anywhere(run):
 def test_the_answer_says_finger_switch_and_forces(run):
     status, out, _ = run("felt", TILES, "--places", 100, "--length", 0.016, "--acceleration", 20, "--foam-density", 300)
     assert status == 0
-    for text in ("an ellipse of 16 x 10 mm, at 100 places", "0.4 N, 10 % spread", "99 % of touches felt from"):
+    for text in (
+        "finger, 16 x 10 mm at a depth of 3 mm, at 100 places",
+        "0.4 N, 10 % spread",
+        "99 % of touches felt from",
+    ):
         assert text in out
 
 

@@ -27,6 +27,15 @@ class Foam:
     """Yield strength Y; None excludes (7) and (8)."""
     strain: float = 1.0
     """Largest relative compression with a stress in the source, else 1."""
+    curve: tuple[tuple[float, float], ...] = ()
+    """Published strains, and stresses in Pa."""
+
+    @property
+    def layer_pa(self) -> float:
+        """E of p = E e / (1 - e) (:class:`contactfpga.design.cover.layers.Layer`), the mean over the curve; without
+        one, :attr:`modulus_pa`."""
+        fits = [stress * (1 - strain) / strain for strain, stress in self.curve]
+        return sum(fits) / len(fits) if fits else self.modulus_pa
 
     def __post_init__(self) -> None:
         positive("modulus_pa", self.modulus_pa, "Pa")
@@ -63,6 +72,7 @@ FOAMS = (
         _PORON + "20 lb/ft3 (320 kg/m3), 34 kPa at 25 %; sold 1.6 to 2.4 mm thick",
         density_kg_m3=320.0,
         strain=0.25,
+        curve=((0.25, 34e3),),
     ),
     Foam(
         "PORON 4701-30, 400",
@@ -70,14 +80,16 @@ FOAMS = (
         _PORON + "25 lb/ft3 (400 kg/m3), 58 kPa at 25 %; sold 0.5 to 1.2 mm thick",
         density_kg_m3=400.0,
         strain=0.25,
+        curve=((0.25, 58e3),),
     ),
     Foam(
         "Plastazote LD33",
         40e3 / 0.25,
         "Zotefoams, Plastazote LD33, typical values (customfoams.co.uk/shop/plastazote-ld33): 33 kg/m3, 40 kPa at "
-        "25 %, 175 kPa at 60 %",
+        "25 %, 75 at 40 %, 115 at 50 %, 175 kPa at 60 %",
         density_kg_m3=33.0,
         strain=0.6,
+        curve=((0.25, 40e3), (0.4, 75e3), (0.5, 115e3), (0.6, 175e3)),
     ),
     Foam(
         "Sylomer W",
@@ -85,6 +97,7 @@ FOAMS = (
         "Getzner, Sylomer W (yumpu.com document 6168404): 5 kPa at about 4 %, peaks of 0.3 MPa at about 80 %; density "
         "not given",
         strain=0.8,
+        curve=((0.04, 5e3), (0.8, 0.3e6)),
     ),
     Foam(
         "Sylodyn ND",
@@ -92,6 +105,7 @@ FOAMS = (
         "Getzner, Sylodyn ND (scribd.com document 365619544): 0.35 MPa at about 10 %, peaks of 4 MPa at about 60 %; "
         "density not given",
         strain=0.6,
+        curve=((0.1, 0.35e6), (0.6, 4e6)),
     ),
 )
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover import medium
+from contactfpga.design.cover import foams, medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
 from contactfpga.design.cover.layers import Body, Indentation, Layer, Spring
 from contactfpga.design.cover.patch import Part
@@ -89,8 +89,9 @@ class Cover:
     """Cap on each switch; None: the foam presses the switch's own face, flush with its surroundings."""
     cut: bool = False
     """Whether the foam is cut between the caps."""
-    modulus_pa: float = 1.2e5
-    """E of the foam at small strains; by default Plastazote LD33's."""
+    modulus_pa: float = foams.find("Plastazote LD33").layer_pa
+    """E of the foam in p = E e / (1 - e). A file may have ``foam`` in its place, a name of
+    :data:`contactfpga.design.cover.foams.FOAMS`."""
 
     def __post_init__(self) -> None:
         if self.model in GONE:
@@ -201,6 +202,12 @@ def read_cover(values: Any) -> Cover:
     """The cover of a TOML table with the fields of :class:`Cover`, and tables ``switch`` and ``cap``."""
     if isinstance(values, dict) and "poisson" in values:
         raise CoverError(f"poisson in [cover] no longer exists; leave it out, the foam's is {medium.POISSON:g}")
+    if isinstance(values, dict) and "foam" in values:
+        if "modulus_pa" in values:
+            raise CoverError("[cover] has foam and modulus_pa; leave one of them out")
+        values = {name: value for name, value in values.items() if name != "foam"} | {
+            "modulus_pa": foams.find(values["foam"]).layer_pa
+        }
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:
