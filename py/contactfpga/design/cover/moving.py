@@ -28,7 +28,8 @@ GROWN = 1.6
 
 class MovingBody:
     """A body on a sheet of ``shape`` (rows, columns) switches; ``closed``: whether the last column is a neighbor of the
-    first. Caps at an edge give way as if the sheet went on. Raises CoverError like :meth:`~contactfpga.design.cover.press.Cover.indentation`."""
+    first. Caps at an edge give way as if the sheet went on. Raises CoverError like
+    :meth:`~contactfpga.design.cover.press.Cover.indentation`."""
 
     def __init__(
         self,
