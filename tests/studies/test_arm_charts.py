@@ -34,13 +34,6 @@ def test_safe_speed_lies_where_the_worst_force_so_far_crosses_the_limit():
     assert math.isnan(sweep.safe_speed(speeds, forces, 20.0))
 
 
-def test_the_naive_speed_is_the_papers_bound_and_no_safe_one():
-    """paper-check: 0.240 m/s for 15 N, 4.156 N and 6 ms; the peak is above 15 N already at 0.23 m/s."""
-    assert sweep.closing_n(PAPER) == pytest.approx(4.15555, abs=5e-6)
-    assert sweep.naive_speed(PAPER, 15.0, 6e-3) == pytest.approx(0.240, abs=5e-4)
-    assert run(PAPER, "latency", latency_s=6e-3).outcome.peak_force_n > 15
-
-
 @pytest.mark.slow
 def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
     case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})

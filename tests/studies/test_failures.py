@@ -98,7 +98,7 @@ def test_it_breaks_where_the_page_says(turn, name, method):
     lines = section("failures.md", "failures").splitlines()
     first = next(number for number, line in enumerate(lines) if f"](#{name}): " in line)
     found = tables.rows(KNOBS[name], {method: turn(name, method)})[0]
-    assert lines[first + place].split(" | ")[1:-1] == found.split(" | ")[1:-1]
+    assert lines[first + place].split(" | ")[1:-1] == list(found[1:-1])
 
 
 @pytest.mark.slow
@@ -405,4 +405,4 @@ NEVER = "fails at the first value"
 def test_lines_of_the_table(verdicts, expected):
     knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
     (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
-    assert line.split(" | ")[1:-1] == ["method", *expected]
+    assert line[1:-1] == ("method", *expected)

@@ -43,7 +43,7 @@ def swept(name, method, seed):
 @pytest.mark.parametrize(("name", "method"), sample(ALL, QUICK))
 def test_each_break_is_where_the_page_says(name, method):
     knob = KNOBS[name]
-    line = rows(knob, {method: swept(name, method, 0)})[0].split(" | ")[2:7]
+    line = list(rows(knob, {method: swept(name, method, 0)})[0][2:7])
     (stated,) = [one.split(" | ")[2:7] for one in on_page(name) if one.split(" | ")[1] == method]
     assert line == stated
 

@@ -124,9 +124,9 @@ def test_a_wire_that_is_slower_than_the_frames_sets_their_rate():
 
 def test_lines_of_the_tables_have_all_columns():
     for name in RIVALS:
-        cells = limits.rival_line(name, 10.0, 12).split(" | ")
-        assert len(cells) == 9
-        assert "nan" not in " ".join(cells[:8])
-        assert len(cells[8].split()) > 10  # what the model assumes
-    found = limits.measured("finger", "tiles", 10.0, 60)
-    assert limits._floor_line("finger", "tiles", 10.0, found).count(" | ") == 7
+        cells = limits.rival_row(name, 12)
+        assert len(cells) == 8
+        assert "nan" not in " ".join(cells[:7])
+        assert len(cells[7].split()) > 10  # what the model assumes
+    found = limits.measured("finger", 10.0, 60)
+    assert limits._floor_line("finger", 10.0, found).count(" | ") == 6

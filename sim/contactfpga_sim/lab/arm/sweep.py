@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover.point import force_n
 from contactfpga.skin import Skin
 from contactfpga.skin.latency import AROUND_S, latency_s
 from contactfpga_sim.lab import kept
@@ -125,10 +124,6 @@ def unlimited(case: Case) -> Case:
     return case.but(control=UNLIMITED)
 
 
-def closing_n(case: Case) -> float:
-    return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
-
-
 def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
     """Highest speed up to which no force exceeds the limit, interpolated; NaN if the slowest exceeds or the fastest
     is safe."""
@@ -139,9 +134,3 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
     at = int(above[0])
     share = (limit_n - worst[at - 1]) / (worst[at] - worst[at - 1])
     return float(speeds[at - 1] + share * (speeds[at] - speeds[at - 1]))
-
-
-def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency; unsafe, as the arm presses on after the reaction."""
-    depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
-    return max(0.0, depth[0] - depth[1]) / latency

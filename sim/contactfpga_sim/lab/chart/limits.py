@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from contactfpga_sim.lab import pool, writer
 from contactfpga_sim.lab.chart import errors
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.floor import Floor, floor
-from contactfpga_sim.lab.chart.methods import EXTENT_MM
+from contactfpga_sim.lab.chart.methods import PITCH_MM, sheet
 from contactfpga_sim.lab.chart.rivals import RIVALS
 from contactfpga_sim.lab.covers import COVERS
 from contactfpga_sim.model.scenes.families import touches
@@ -20,56 +19,30 @@ from contactfpga_sim.model.scenes.families import touches
 PITCHES_MM = (5.0, 6.4, 8.0, 10.0)
 SCENES = 4000
 
-KNOWN_MM = 7.0
-"""Radius of a finger of known size."""
+CONTACTS = ("finger", "bumper")
+"""Families."""
 
-CONTACTS: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
-    "finger": ("finger", {}, tuple(COVERS)),
-    f"round finger, {KNOWN_MM:g} mm": (
-        "finger",
-        {"half_mm": (KNOWN_MM, KNOWN_MM), "ratio": (1.0, 1.0)},
-        ("bare", "tiles"),
-    ),
-    "bumper": ("bumper", {}, ("bare", "tiles")),
-}
-"""Family, options and covers by name."""
-
-RIVAL_PITCHES_MM = (6.4, 10.0)
 TOUCHES = 300
 
 
 def floor_table() -> str:
-    head = (
-        "contact",
-        "cover",
-        "pitch",
-        "felt",
-        "barycenter",
-        "floor, between",
-        "table of places",
-        "saved by the table",
-    )
-    rows = [
-        (name, cover, pitch)
-        for name, (_, _, covers) in CONTACTS.items()
-        for cover, pitch in itertools.product(covers, PITCHES_MM)
-    ]
+    head = ("contact", "pitch", "felt", "barycenter", "floor, between", "table of places", "saved by the table")
+    rows = list(itertools.product(CONTACTS, PITCHES_MM))
     with pool.executor() as executor:
         found = executor.map(measured, *zip(*rows, strict=True))
         return writer.table(head, [_floor_line(*row, one) for row, one in zip(rows, found, strict=True)])
 
 
-def measured(name: str, cover: str, pitch_mm: float, count: int = SCENES) -> Floor:
-    family, options, _ = CONTACTS[name]
+def measured(family: str, pitch_mm: float, count: int = SCENES) -> Floor:
     skin = Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
-    return floor(family, skin, COVERS[cover](pitch_mm), count, 0, **options)
+    return floor(family, skin, COVERS["tiles"](pitch_mm), count, 0)
 
 
-def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
+def _floor_line(family: str, pitch_mm: float, found: Floor) -> str:
     saved = 1 - found.table_mm.mean / found.barycenter_mm.mean
     return writer.line(
         (
-            name, cover, f"{pitch_mm:g} mm", _share(found.felt), _length(found.barycenter_mm),
+            family, f"{pitch_mm:g} mm", _share(found.felt), _length(found.barycenter_mm),
             f"{found.lower_mm.mean:.2f} ({found.lower_mm.low:.2f}) and {found.upper_mm.mean:.2f}"
             f" ({found.upper_mm.high:.2f}) mm",
             _length(found.table_mm), f"{round(100 * saved)} %",
@@ -77,33 +50,27 @@ def _floor_line(name: str, cover: str, pitch_mm: float, found: Floor) -> str:
     )  # fmt: skip
 
 
-def rivals_table() -> str:
-    head = (
-        "model", "pitch", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts",
-        "assumes",
-    )  # fmt: skip
-    rows = list(itertools.product(RIVALS, RIVAL_PITCHES_MM))
+def rivals_table() -> writer.Table:
+    head = ("model", "miscounted", "missed", "barycenter", "touch to last byte, median / 95 %", "lines", "parts")
     with pool.executor() as executor:
-        return writer.table(head, list(executor.map(rival_line, *zip(*rows, strict=True))))
+        rows = list(executor.map(rival_row, RIVALS))
+    return writer.Table((*head, "assumes"), rows, columns=[name for name in head if name not in ("missed", "lines")])
 
 
-def rival_line(name: str, pitch_mm: float, count: int = TOUCHES) -> str:
-    rival, cover = RIVALS[name], COVERS["tiles"](pitch_mm)
-    lines = round(EXTENT_MM / pitch_mm)
+def rival_row(name: str, count: int = TOUCHES) -> tuple[str, ...]:
+    rival, cover = RIVALS[name], COVERS["tiles"](PITCH_MM)
     # On tiles of their own, cells that share a corner only are not joined.
-    skin = Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, connectivity=4)
+    skin = sheet(PITCH_MM)
     scenes = touches("fingers", count, 0, skin)
     rng = np.random.default_rng(0)
     found = [rival.errors(scene, skin, cover) for scene in scenes]
     times = np.array([rival.time_us(scene, skin, cover, rng) for scene in scenes]) / 1e3
     median, late = np.quantile(times, (0.5, 0.95), method="inverted_cdf")
     means = {key: errors.interval([float(getattr(one, key)) for one in found]) for key in errors.METRICS}
-    return writer.line(
-        (
-            name, f"{pitch_mm:g} mm", _share(means["miscounted"]), _share(means["missed"]),
-            _length(means["barycenter_mm"]), f"{median:.1f} / {late:.1f} ms", str(rival.wires(skin)),
-            f"{rival.cost_usd(skin):.0f} USD", rival.note.removeprefix("model: "),
-        )
+    return (
+        name, _share(means["miscounted"]), _share(means["missed"]), _length(means["barycenter_mm"]),
+        f"{median:.1f} / {late:.1f} ms", str(rival.wires(skin)), f"{rival.cost_usd(skin):.0f} USD",
+        rival.note.removeprefix("model: "),
     )  # fmt: skip
 
 

@@ -63,10 +63,16 @@ KINDS = {
 }
 
 
-def felt_table() -> str:
+def felt_table() -> writer.Table:
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
-    return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
+    rows = [_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS)]
+    columns = [name for name in head if not name.endswith(("least", "worst"))]
+    paper, *_, caps, tiles = KINDS
+    fine = f"{PITCHES_MM[-1]:g} mm"
+    return writer.Table(
+        head, rows, lambda row: row[1] == paper or (row[0] == fine and row[1] in (caps, tiles)), columns
+    )
 
 
 def felt_sample() -> str:

@@ -13,7 +13,7 @@ from contactfpga.design.cover import arm, elastic, impact
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import Arm, slowness, speed2
 from contactfpga.design.cover.hertz import Ball
-from contactfpga.design.cover.numerics import Floats, gauss, legendre
+from contactfpga.design.cover.numerics import Floats, gauss
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, PaddedSheet
 
@@ -52,72 +52,6 @@ BLOWS = (
 Rule = Callable[[Blow], float]
 
 
-def _trapezoid(points: int, with_end: bool) -> Rule:
-    def rule(blow: Blow) -> float:
-        depth = np.linspace(0, blow.depth_m, points + 1)
-        square = blow.square(depth)
-        square[-1] = 0.0
-        with np.errstate(divide="ignore"):
-            slow = 1 / np.sqrt(np.maximum(square, 0))
-        weights = np.full(points + 1, depth[1])
-        weights[[0, -1]] /= 2
-        last = None if with_end else -1
-        return float(weights[:last] @ slow[:last])
-
-    return rule
-
-
-def _midpoint(points: int) -> Rule:
-    def rule(blow: Blow) -> float:
-        step = blow.depth_m / points
-        return float((step / np.sqrt(blow.square(step * (np.arange(points) + 0.5)))).sum())
-
-    return rule
-
-
-def _raw_gauss(nodes: int) -> Rule:
-    def rule(blow: Blow) -> float:
-        return gauss(lambda depth: 1 / np.sqrt(blow.square(depth)), 0.0, blow.depth_m, nodes)
-
-    return rule
-
-
-def _off(share: float, nodes: int) -> Rule:
-    """delta = delta_c sin^2(phi) without factoring it out, at a slightly short delta_c."""
-
-    def rule(blow: Blow) -> float:
-        depth = blow.depth_m * (1 - share)
-        x, weights = legendre(nodes)
-        phi = math.pi / 4 * (1 + x)
-        slow = 2 * depth * np.sin(phi) * np.cos(phi) / np.sqrt(blow.square(depth * np.sin(phi) ** 2))
-        return math.pi / 4 * float(weights @ slow)
-
-    return rule
-
-
-def _off_factored(share: float) -> Rule:
-    def rule(blow: Blow) -> float:
-        return _sine(16)(blow, blow.depth_m * (1 - share))
-
-    return rule
-
-
-def _euler(step_share: float) -> Rule:
-    """Explicit steps on v = sqrt(v^2(delta)), which never start from rest."""
-
-    def rule(blow: Blow) -> float:
-        depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m
-        while depth < end * (1 - 1e-12):
-            square = float(blow.square(np.asarray(depth)))
-            count += 1
-            if square <= 0 or count == STALLED:
-                return math.nan
-            depth += step * math.sqrt(square)
-        return count * step
-
-    return rule
-
-
 def _sine(nodes: int) -> Callable[..., float]:
     def rule(blow: Blow, depth: float | None = None) -> float:
         end = blow.depth_m if depth is None else depth
@@ -150,19 +84,6 @@ RULES: dict[str, Rule] = {
     "ODE, 1e-8": _ode(1e-8),
     "**ODE, 1e-10**": _ode(1e-10),
     "ODE, 1e-12": _ode(1e-12),
-}
-
-FAILING: dict[str, Rule] = {
-    "trapezoid, 100": _trapezoid(100, True),
-    "trapezoid without its end, 100": _trapezoid(100, False),
-    "trapezoid without its end, 10,000": _trapezoid(10_000, False),
-    "midpoint, 100": _midpoint(100),
-    "Gauss-Legendre, 8": _raw_gauss(8),
-    "Gauss-Legendre, 64": _raw_gauss(64),
-    "16 nodes, sin², δ_c short by 1e-8": _off(1e-8, 16),
-    "256 nodes, sin², δ_c short by 1e-8": _off(1e-8, 256),
-    "16 nodes factored, δ_c short by 1e-8": _off_factored(1e-8),
-    "Euler on v = √v²(δ), 100 steps": _euler(0.01),
 }
 
 

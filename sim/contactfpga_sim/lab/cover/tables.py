@@ -217,9 +217,9 @@ def _cell(error: float) -> str:
     return f"{abs(error):.0e}"
 
 
-def _rule_table(rules: dict[str, formulas.Rule]) -> str:
+def rules_table() -> str:
     rows = [["rule", *(blow.name for blow in formulas.BLOWS), "time"]]
-    for name, rule in rules.items():
+    for name, rule in formulas.RULES.items():
         errors = formulas.relative_errors(rule)
         with np.errstate(all="ignore"):
             takes = 1e6 * formulas.seconds(lambda rule=rule: rule(formulas.BLOWS[0]))  # type: ignore[misc]
@@ -240,9 +240,13 @@ def sense_table() -> str:
     return writer.table_of(rows)
 
 
-def paper_table() -> str:
+DISAGREES = ("wrong;", "inconsistent", "low by", "vacuous", "the cover bottoms", "the model fails", "fails its own")
+"""Beginnings of the verdicts that the page shows."""
+
+
+def paper_table() -> writer.Table:
     lines = [(row.printed, row.ours, row.verdict) for row in rows()]
-    return writer.table_of([("paper says", "we get", "verdict"), *lines])
+    return writer.Table(("paper says", "we get", "verdict"), lines, lambda row: row[2].startswith(DISAGREES))
 
 
 def thinning_table() -> str:
@@ -266,22 +270,14 @@ def thinning_table() -> str:
     return writer.table(head, lines)
 
 
-def foam_table() -> str:
-    rows = [["foam", "E", "density", "Y", "pressed up to", "source"]]
+def foam_table() -> writer.Table:
+    head, rows = ["foam", "E", "density", "Y", "pressed up to", "source"], []
     for one in FOAMS:
         density = "" if one.density_kg_m3 is None else f"{one.density_kg_m3:g} kg/m³"
         strength = "" if one.yield_pa is None else f"{1e-3 * one.yield_pa:g} kPa"
         modulus, strain = f"{1e-3 * one.modulus_pa:g} kPa", f"{100 * one.strain:g} %"
         rows.append([one.name, modulus, density, strength, strain, one.source])
-    return writer.table_of(rows)
-
-
-def rules_table() -> str:
-    return _rule_table(formulas.RULES)
-
-
-def failing_table() -> str:
-    return _rule_table(formulas.FAILING)
+    return writer.Table(head, rows, columns=head[:-1])
 
 
 def draw(folder: Path) -> list[Path]:

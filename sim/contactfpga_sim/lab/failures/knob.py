@@ -48,8 +48,6 @@ class Knob:
     """Why nothing reports a ``silent`` fault."""
     closed: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Break points by closed form, by method."""
-    closed_form: str = ""
-    """The closed form in words."""
 
     def sweep(
         self, step: Callable[[], None] = lambda: None, so_far: dict[str, Sweep] | None = None

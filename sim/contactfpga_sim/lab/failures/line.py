@@ -205,8 +205,8 @@ BAUD = Knob(
         for speed, sign in (("faster", 1), ("slower", -1))
     },
     helps="a Skin is refused beyond 1.5 %; `contactfpga doctor` counts what is damaged",
+    # The middle of the stop bit, 9.5 bits after the start, slips by half a bit; a look takes 1/16 of a bit.
     closed={f"host {speed}, frames": round(100 * 0.5 / 9.5, 2) for speed in ("faster", "slower")},
-    closed_form="the middle of the stop bit, 9.5 bits after the start, slips by half a bit; a look takes 1/16 of a bit",
 )
 
 
@@ -229,9 +229,9 @@ NOISE = Knob(
     values=(0, 100, 300, 500, 600, 700, 800, 900, 1_000, 2_000, 5_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": Rated(_noise)},
     helps="a shorter cable, a slower `baud`",
+    # Pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the byte that it
+    # makes is added; a frame comes every 96 us.
     closed={"half a bit to two bits long": float(round(-math.log(0.95) * 1000 / SCAN_MS))},
-    closed_form="pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the "
-    "byte that it makes is added; a frame comes every 96 us",
 )
 
 
@@ -387,6 +387,6 @@ HOST = Knob(
     values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
     runs={"every frame of `contactfpga.open()`": Rated(_slow_host, most=120)},
     helps='`Board.latest()` where only the newest frame counts; `send = "on_change"`',
+    # The system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan.
     closed={"every frame of `contactfpga.open()`": round(TTY_BYTES / (ZONE_BYTES + 4) * SCAN_MS, 1)},
-    closed_form="the system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan",
 )

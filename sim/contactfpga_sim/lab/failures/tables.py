@@ -18,20 +18,27 @@ HEAD = (
 )
 
 
-def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    return writer.table(HEAD, [line for name, methods in sweeps.items() for line in rows(KNOBS[name], methods)])
+SHOWN = ("crossing", "closing", "light", "bounce", "diodes", "broken", "stuck", "silence")
+"""Knobs whose first method the page shows."""
+COLUMNS = ("knob", "breaks at", "what helps")
 
 
-def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
-    """A knob's lines, common cells in the first. ``pictured``: the page has its picture."""
-    title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
+def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
+    lines = {name: rows(KNOBS[name], methods) for name, methods in sweeps.items()}
+    shown = [lines[name][0] for name in SHOWN]
+    return writer.Table(HEAD, [row for some in lines.values() for row in some], lambda row: row in shown, COLUMNS)
+
+
+def rows(knob: Knob, methods: Mapping[str, Sweep]) -> list[tuple[str, ...]]:
+    """A knob's rows, common cells in the first."""
+    title = f"[{knob.title}](#{knob.name})"
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
         first = f"{title}: {knob.axis}" if number == 0 else ""
         helps = knob.helps if number == 0 else ""
         closed = knob.format.format(knob.closed[method]) if method in knob.closed else ""
         holds, breaks, *rest = _cells(knob, sweep)
-        lines.append(writer.line((first, method, holds, breaks, closed, *rest, helps)))
+        lines.append((first, method, holds, breaks, closed, *rest, helps))
     return lines
 
 
@@ -68,29 +75,22 @@ def says(knob: Knob, sweep: Sweep) -> str:
     return "; ".join(parts)
 
 
-CLOSED = ("knob", "closed form", "value")
-
-
-def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    lines = []
-    for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
-        values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
-        lines.append(writer.line((f"[{knob.title}](#{knob.name})", knob.closed_form, f"{values} ({knob.axis})")))
-    return writer.table(CLOSED, lines)
-
-
 UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
-def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+EXPLAINED = tuple(f"#{name})" for name in ("diodes", "broken", "stuck", "silence"))
+"""Links of the knobs whose reason the page shows."""
+
+
+def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
     """A row per knob with an unnoticed fault, and the reason."""
     lines = []
     for name, methods in sweeps.items():
         where = [method for method, found in methods.items() if found.silent_at is not None]
         if where:
             knob = KNOBS[name]
-            lines.append(writer.line((f"[{knob.title}](#{name})", ", ".join(where), knob.unnoticed)))
-    return writer.table(UNNOTICED, lines)
+            lines.append((f"[{knob.title}](#{name})", ", ".join(where), knob.unnoticed))
+    return writer.Table(UNNOTICED, lines, lambda row: row[0].endswith(EXPLAINED), (UNNOTICED[0], UNNOTICED[2]))
 
 
 SAID = {

@@ -81,13 +81,13 @@ CLOSING = Knob(
     | {f"starter kit, {force} N each": Rated(functools.partial(_closing_covered, force)) for force in (2, 5, 10)},
     helps="a finer pitch; 4-connectivity; a light touch",
     unnoticed="the same switches are pressed as by one contact of that shape",
+    # Wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from sqrt(2) pitches on, by
+    # 4-connectivity from one on.
     closed={
         f"{connectivity}-connectivity, {pitch} mm": round(pitch * (math.sqrt(2) if connectivity == 8 else 1), 2)
         for pitch in (10, 5)
         for connectivity in (8, 4)
     },
-    closed_form="wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from √2 "
-    "pitches on, by 4-connectivity from one on",
 )
 
 
@@ -212,8 +212,8 @@ BOUNCE = Knob(
     },
     helps="longer debounce times than the switch bounces; nobody can tell a long bounce from a second touch",
     unnoticed="a switch that opens and closes once more is what a second touch is",
+    # A switch that is open for the release time counts as released.
     closed={f"`{method}`": 24.0 * DEBOUNCE_SCANS for method in ("sym_defer_pk", "asym_eager_defer_pk")},
-    closed_form="a switch that is open for the release time counts as released",
 )
 
 
@@ -287,8 +287,8 @@ CROSSING = Knob(
     runs={f"`{name}`": Rated(functools.partial(_crossing, SKINS[name])) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
     unnoticed="pressed cells that touch are one zone by definition; `projection` and `single` see shadows only",
+    # As for two fingers that close in: 24 mm and sqrt(2) pitches.
     closed={"`run`": 38.14},
-    closed_form="as for two fingers that close in: 24 mm and √2 pitches",
 )
 
 

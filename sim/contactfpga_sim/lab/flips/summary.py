@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
 from contactfpga_sim.lab.flips import campaign
 from contactfpga_sim.lab.flips.campaign import Row, wilson
-from contactfpga_sim.lab.flips.flip import module
 from contactfpga_sim.model.board.state import StateBoard
 
 
@@ -69,15 +67,3 @@ def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
     """Median and longest silently wrong output, in ms."""
     times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
     return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
-
-
-def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
-    """Rows by ``key``, the most silently wrong first."""
-    parts: dict[str, list[Row]] = defaultdict(list)
-    for row in rows:
-        parts[key(row)].append(row)
-    return dict(sorted(parts.items(), key=lambda part: (-share(part[1]).hits, -len(part[1]), part[0])))
-
-
-def stage(row: Row) -> str:
-    return module(row.found.name)

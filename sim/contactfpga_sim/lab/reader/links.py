@@ -27,14 +27,13 @@ class Share(NamedTuple):
     age_ms: float
 
 
-def measured(reader: str, links: int, call: str) -> Share:
-    """Load of links; ``call``: ``latest`` takes each link's newest frame, ``batch`` all of them."""
+def measured(reader: str, links: int) -> Share:
+    """Load of links of which a program takes the newest frame every :data:`LOOP_S`."""
     with contextlib.closing(Feeder(links, PACE)) as feeder, contextlib.ExitStack() as opened:
         with ThreadPoolExecutor(4) as workers:
             boards = list(workers.map(lambda port: _opened(port, reader), feeder.ports))
         for board in boards:
             opened.callback(board.close)
-        queues = [board.subscribe(int(PACE.per_second * PACE.seconds)) for board in boards]
         feeder.begin()
         while not feeder.written_s[0]:  # the frames are made first
             time.sleep(0.01)
@@ -43,8 +42,7 @@ def measured(reader: str, links: int, call: str) -> Share:
         used, begun = time.process_time(), time.monotonic()
         ages: list[float] = []
         while (now := time.monotonic()) < begun + PACE.seconds - 0.5:
-            for board, queue in zip(boards, queues):
-                ages.append(_age_s(board, queue, call, feeder))
+            ages += [_age_s(board, feeder) for board in boards]
             time.sleep(max(0.0, now + LOOP_S - time.monotonic()))
         span = time.monotonic() - begun
         used = time.process_time() - used
@@ -58,14 +56,9 @@ def _opened(port: str, reader: str) -> contactfpga.Board:
     return contactfpga.open(port, SKIN, timeout=60.0, reader=reader)
 
 
-def _age_s(board: contactfpga.Board, queue: contactfpga.Subscription, call: str, feeder: Feeder) -> float:
-    if call == "latest":
-        zones = board.latest(10.0)
-        time_us, arrived_s = zones.time_us, zones.arrived_s
-    else:
-        frames = queue.batch(0.0, 10.0).frames
-        time_us, arrived_s = int(frames["time_us"][-1]), float(frames["arrived_s"][-1])
-    place = time_us // PACE.step_us - feeder.first[0]
-    if not 0 <= place < len(feeder.written_s) or arrived_s is None:
+def _age_s(board: contactfpga.Board, feeder: Feeder) -> float:
+    zones = board.latest(10.0)
+    place = zones.time_us // PACE.step_us - feeder.first[0]
+    if not 0 <= place < len(feeder.written_s) or zones.arrived_s is None:
         return 0.0
     return time.monotonic() - feeder.written_s[place]

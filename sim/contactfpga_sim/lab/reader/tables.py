@@ -15,7 +15,7 @@ from contactfpga_sim.lab.reader.feeder import PACES, Pace
 from contactfpga_sim.lab.reader.latency import READERS, Found
 
 ROUNDS = 1
-LINKS = (16, "latest"), (16, "batch"), (64, "latest"), (64, "batch")
+LINKS = (16, 64)
 
 
 def times(streams: list[Found]) -> tuple[float, float]:
@@ -75,13 +75,13 @@ def loop_table() -> str:
     return writer.table_of(rows)
 
 
-def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
-    rows = [["links of 1 kHz", "each 10 ms", "reader", "of a core", "frames that came in time", "age"]]
-    for count, call in asked:
+def links_table() -> str:
+    rows = [["links of 1 kHz", "reader", "of a core", "frames that came in time", "age"]]
+    for count in LINKS:
         for reader in READERS:
-            found = links.measured(reader, count, call)
+            found = links.measured(reader, count)
             shares = [f"{100 * share:.0f} %" for share in (found.used, found.came)]
-            rows.append([str(count), f"`{call}()`", f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
+            rows.append([str(count), f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
     return writer.table_of(rows)
 
 

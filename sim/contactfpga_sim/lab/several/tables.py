@@ -19,7 +19,7 @@ from contactfpga_sim.model.golden.trace import Trace
 from contactfpga_sim.model.scenes.scene import scene
 
 SKIN = Skin(row_drive="74hc595", column_read="74hc165")
-COUNTS = (1, 2, 3, 4, 8)
+COUNTS = (1, 2, 4, 8)
 BAUDS = (3_000_000, 12_000_000)
 SECONDS = 0.05
 
