@@ -19,7 +19,6 @@ from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import (
-    beside,
     compute,
     errors,
     front_picture,
@@ -34,7 +33,6 @@ from contactfpga_sim.lab.chart import (
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.errors import Blob
 from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.chart.rivals import RIVALS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -327,15 +325,6 @@ def test_the_page_shows_what_its_numbers_say(tmp_path):
         (tmp_path / folder).mkdir()
     for path in tables.draw(tmp_path / "images", points):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
-
-
-def test_ways_beside_the_chart_are_found_on_its_families():
-    found = beside.rivals(("bumper",), 3, 0)
-    assert [(one.name, one.family) for one in found] == [(name, "bumper") for name in RIVALS]
-    assert all(one.touch_us.value > 0 and one.errors["miscounted"].count == 3 for one in found)
-    task = next(point.task for point in numbers.read(ROOT / tables.NUMBERS) if point.task.family == "bumper")
-    assert 0 < beside.least_mm(task).mean < task.skin.pitch_x_mm
-    assert beside.least_mm(dataclasses.replace(task, family="fingers")) is None
 
 
 def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():

@@ -34,6 +34,11 @@ class Section:
     """Whether netlists (:mod:`.size`), not reached code, date it."""
 
 
+def tables(names: str = "", **others: Section) -> dict[str, Section]:
+    """Sections by marker: of ``names`` each is made by ``tables:NAME_table``, and then ``others``."""
+    return {name: Section(f"tables:{name}_table") for name in names.split()} | others
+
+
 @dataclasses.dataclass(frozen=True)
 class Study:
     """Outputs and needs of a study."""

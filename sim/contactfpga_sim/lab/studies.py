@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.lab.registry import Section, Study
+from contactfpga_sim.lab.registry import Section, Study, tables
 
 _ALL = (
     Study(
@@ -10,16 +10,13 @@ _ALL = (
         title="A robot arm that meets a person",
         page="arm.md",
         minutes=12,
-        sections={
-            "matters": Section("tables:matters_text"),
-            "places": Section("tables:places_table"),
-            "set": Section("tables:set_table"),
-            "sheet": Section("tables:sheet_table"),
-            "speeds": Section("tables:speed_table"),
-            "defense": Section("tables:defense_table"),
-            "pushes": Section("tables:push_table", sample="tables:push_table"),
-            "failures": Section("tables:failure_table"),
-        },
+        sections=tables(
+            "places set sheet defense",
+            matters=Section("tables:matters_text"),
+            speeds=Section("tables:speed_table"),
+            pushes=Section("tables:push_table", sample="tables:push_table"),
+            failures=Section("tables:failure_table"),
+        ),
         compute="tables:compute",
         pictures="tables:draw",
     ),
@@ -28,13 +25,7 @@ _ALL = (
         title="A robot of several sheets",
         page="body.md",
         minutes=4,
-        sections={
-            "outages": Section("tables:outages_table"),
-            "registration": Section("tables:registration_table"),
-            "folds": Section("tables:folds_table", sample="tables:folds_sample"),
-        },
-        pictures="picture:draw",
-        needs=("chromium",),
+        sections=tables("outages registration", folds=Section("tables:folds_table", sample="tables:folds_sample")),
         extra="test",
     ),
     Study(
@@ -42,14 +33,7 @@ _ALL = (
         title="Speed against accuracy",
         page="chart.md",
         minutes=25,
-        sections={
-            "front": Section("tables:front_table"),
-            "families": Section("tables:families_table"),
-            "methods": Section("tables:methods_table"),
-            "host": Section("tables:host_table"),
-            "floor": Section("limits:floor_table"),
-            "other_ways": Section("limits:rivals_table"),
-        },
+        sections=tables("front families methods host"),
         compute="tables:compute",
         pictures="tables:draw",
         extra="chart",
@@ -59,19 +43,17 @@ _ALL = (
         title="Board time on the host's clock, over simulated ways to the host",
         page="clock.md",
         minutes=1,
-        sections={
-            "accuracy": Section("tables:accuracy_table", sample="tables:slow_sample"),
-        },
+        sections=tables(accuracy=Section("tables:accuracy_table", sample="tables:slow_sample")),
     ),
     Study(
         "closed",
         title="Cost of labelling over the seam of a closed sheet",
         page="labelling.md",
         minutes=5,
-        sections={
-            "closed": Section("tables:clocks_table", sample="tables:clocks_sample"),
-            "closed_size": Section("tables:size_table", of_netlists=True),
-        },
+        sections=tables(
+            closed=Section("tables:clocks_table", sample="tables:clocks_sample"),
+            closed_size=Section("tables:size_table", of_netlists=True),
+        ),
         extra="boards",
     ),
     Study(
@@ -79,16 +61,15 @@ _ALL = (
         title="Formulas for covers of foam against integrals and the paper",
         page="cover.md",
         minutes=3,
-        sections={
-            "closes": Section("caps:felt_table", sample="caps:felt_sample"),
-            "elements": Section("caps:elements_table", page="paper.md"),
-            "sags": Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
-            "paper": Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
-            "rules": Section("tables:rules_table", page="paper.md"),
-            "sense": Section("tables:sense_table"),
-            "thinning": Section("tables:thinning_table", sample="tables:thinning_table"),
-            "foams": Section("tables:foam_table", sample="tables:foam_table"),
-        },
+        sections=tables(
+            "sense",
+            closes=Section("caps:felt_table", sample="caps:felt_sample"),
+            elements=Section("caps:elements_table", page="paper.md"),
+            sags=Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
+            paper=Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
+            thinning=Section("tables:thinning_table", sample="tables:thinning_table"),
+            foams=Section("tables:foam_table", sample="tables:foam_table"),
+        ),
         pictures="tables:draw",
         extra="test",
     ),
@@ -97,22 +78,15 @@ _ALL = (
         title="One knob after another until something breaks",
         page="failures.md",
         minutes=10,
-        sections={
-            "failures": Section("tables:table"),
-            "unnoticed": Section("tables:unnoticed"),
-            "pictures": Section("tables:pictures", sample="tables:pictures"),
-        },
+        sections=tables(failures=Section("tables:table"), unnoticed=Section("tables:unnoticed")),
         compute="tables:compute",
-        pictures="tables:draw",
     ),
     Study(
         "fit",
         title="Skins that `contactfpga fit` chooses for the examples",
         page="fit.md",
         minutes=10,
-        sections={
-            "fingers": Section("tables:fingers_section"),
-        },
+        sections=tables(fingers=Section("tables:fingers_section")),
         extra="chart",
     ),
     Study(
@@ -120,10 +94,7 @@ _ALL = (
         title="Flipped bits of the running gateware",
         page="flips.md",
         minutes=30,
-        sections={
-            "worst": Section("tables:worst_text"),
-            "flipped": Section("tables:designs_table"),
-        },
+        sections=tables(worst=Section("tables:worst_text"), flipped=Section("tables:designs_table")),
         compute="tables:compute",
         pictures="tables:draw",
         extra="chart",
@@ -133,17 +104,11 @@ _ALL = (
         title="Places and forces by pressure units",
         page="haptics.md",
         minutes=5,
-        sections={
-            "layouts": Section("tables:layouts_table", sample="tables:layouts_table"),
-            "places": Section("tables:places_table"),
-            "wrong": Section("tables:wrong_table"),
-            "pairs": Section("tables:pairs_table"),
-            "limits": Section("tables:limits_table"),
-            "breaks": Section("tables:breaks_table", page="haptics_limits.md"),
-            "breakpictures": Section(
-                "tables:breaks_pictures", page="haptics_limits.md", sample="tables:breaks_pictures"
-            ),
-        },
+        sections=tables(
+            "places wrong pairs",
+            layouts=Section("tables:layouts_table", sample="tables:layouts_table"),
+            breaks=Section("tables:breaks_table", page="haptics_limits.md"),
+        ),
         pictures="tables:draw",
         extra="test",
     ),
@@ -152,14 +117,12 @@ _ALL = (
         title="The kits, from the finger to the host",
         page="kits.md",
         minutes=12,
-        sections={
-            "kits": Section("tables:headline", page="../README.md"),
-            "times": Section("tables:times_table"),
-            "built": Section("tables:built_table"),
-            "pins": Section("tables:pins_table"),
-            "parts": Section("tables:parts_table", sample="tables:parts_table"),
-            "predictions": Section("tables:predictions_table", sample="tables:predictions_table"),
-        },
+        sections=tables(
+            "times built pins",
+            kits=Section("tables:headline", page="../README.md"),
+            parts=Section("tables:parts_table", sample="tables:parts_table"),
+            predictions=Section("tables:predictions_table", sample="tables:predictions_table"),
+        ),
         compute="tables:compute",
         extra="boards",
     ),
@@ -168,23 +131,18 @@ _ALL = (
         title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
         minutes=1,
-        sections={
-            "diodes": Section("tables:diodes_table", sample="tables:diodes_table"),
-            "pulls": Section("tables:pulls_table", sample="tables:pulls_table"),
-            "series": Section("tables:series_table", sample="tables:series_table"),
-        },
+        sections=tables(
+            diodes=Section("tables:diodes_table", sample="tables:diodes_table"),
+            pulls=Section("tables:pulls_table", sample="tables:pulls_table"),
+            series=Section("tables:series_table", sample="tables:series_table"),
+        ),
     ),
     Study(
         "mujoco",
         title="An arm with and without skin, and a sheet beside a momentum observer",
         page="mujoco.md",
         minutes=8,
-        sections={
-            "peaks": Section("clip:peaks_table"),
-            "observer": Section("collisions:observer_table", page="collisions.md"),
-        },
-        pictures="clip:draw",
-        needs=("chromium",),
+        sections=tables(peaks=Section("clip:peaks_table")),
         extra="test",
     ),
     Study(
@@ -192,11 +150,7 @@ _ALL = (
         title="Mutants of the netlist that the comparison with the golden model tells",
         page="mutants.md",
         minutes=150,
-        sections={
-            "mutants": Section("tables:mutants_table"),
-            "options": Section("tables:options_table"),
-            "several": Section("tables:several_table"),
-        },
+        sections=tables("mutants options several"),
         compute="tables:compute",
     ),
     Study(
@@ -204,11 +158,7 @@ _ALL = (
         title="Links over a network",
         page="net.md",
         minutes=2,
-        sections={
-            "batch": Section("tables:batch_table"),
-            "links": Section("tables:links_table"),
-            "thousand": Section("tables:thousand_table"),
-        },
+        sections=tables("batch links thousand"),
         pictures="tables:draw",
         extra="test",
     ),
@@ -217,46 +167,31 @@ _ALL = (
         title="Latency, rate and clocks of the gateware",
         page="performance.md",
         minutes=5,
-        sections={
-            "reference": Section("scans:reference_table", sample="scans:reference_sample"),
-            "labeller": Section("labellers:labeller_table", sample="labellers:labeller_sample"),
-            "report": Section("scans:report_table", sample="scans:report_sample"),
-            "fast": Section("scans:latency_table", sample="scans:latency_sample"),
-            "bridges": Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
-        },
+        sections=tables(
+            reference=Section("scans:reference_table", sample="scans:reference_sample"),
+            labeller=Section("labellers:labeller_table", sample="labellers:labeller_sample"),
+            report=Section("scans:report_table", sample="scans:report_sample"),
+            fast=Section("scans:latency_table", sample="scans:latency_sample"),
+            bridges=Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
+        ),
     ),
     Study(
         "reader",
         title="From the last byte to user code, by a thread and by a process",
         page="performance.md",
         minutes=5,
-        sections={
-            "reader_rest": Section("tables:rest_table"),
-            "reader_busy": Section("tables:busy_table"),
-            "reader_loop": Section("tables:loop_table"),
-            "reader_links": Section("tables:links_table"),
-        },
+        sections=tables(
+            reader_rest=Section("tables:rest_table"),
+            reader_busy=Section("tables:busy_table"),
+            reader_loop=Section("tables:loop_table"),
+        ),
     ),
     Study(
         "recordings",
         title="Size of recordings, and loss by a killed program",
         page="recordings.md",
         minutes=2,
-        sections={
-            "sizes": Section("tables:sizes_table"),
-            "loss": Section("tables:loss_table"),
-        },
-        extra="test",
-    ),
-    Study(
-        "ros",
-        title="Messages to nodes of ROS 2",
-        page="ros.md",
-        minutes=10,
-        sections={
-            "costs": Section("scripts/measure_ros.py:costs_table"),
-            "shown": Section("scripts/measure_ros.py:shown_table"),
-        },
+        sections=tables("sizes loss"),
         extra="test",
     ),
     Study(
@@ -264,30 +199,19 @@ _ALL = (
         title="Every electrical fault in the sheet",
         page="safety.md",
         minutes=5,
-        sections={
-            "coverage": Section("tables:coverage_table"),
-            "faults": Section("tables:faults_table"),
-            "times": Section("tables:times_table", sample="tables:times_table"),
-        },
+        sections=tables("coverage faults", times=Section("tables:times_table", sample="tables:times_table")),
     ),
-    Study(
-        "scenes",
-        title="The built-in scenes",
-        page="scenes.md",
-        minutes=1,
-        pictures="pictures:draw",
-    ),
+    Study("scenes", title="The built-in scenes", page="scenes.md", minutes=1, pictures="pictures:draw"),
     Study(
         "settle",
         title="Times that a sheet's circuit needs",
         page="settle.md",
         minutes=2,
-        sections={
-            "needs": Section("tables:needs_table"),
-            "breaks": Section("tables:breaks_table"),
-            "shorted": Section("tables:shorted_table", sample="tables:shorted_table"),
-            "summary": Section("tables:summary_table", needs=("ngspice",)),
-        },
+        sections=tables(
+            "needs breaks",
+            shorted=Section("tables:shorted_table", sample="tables:shorted_table"),
+            summary=Section("tables:summary_table", needs=("ngspice",)),
+        ),
         pictures="pictures:draw",
     ),
     Study(
@@ -295,10 +219,10 @@ _ALL = (
         title="Cost of several sheets at one FPGA",
         page="several.md",
         minutes=3,
-        sections={
-            "several_line": Section("tables:line_table", sample="tables:line_sample"),
-            "several_size": Section("tables:size_table", of_netlists=True),
-        },
+        sections=tables(
+            several_line=Section("tables:line_table", sample="tables:line_sample"),
+            several_size=Section("tables:size_table", of_netlists=True),
+        ),
         extra="boards",
     ),
     Study(
@@ -306,12 +230,12 @@ _ALL = (
         title="Size and clock by place and route",
         page="performance.md",
         minutes=60,
-        sections={
-            "gateware": Section("tables:gateware_table", of_netlists=True),
-            "faults": Section("tables:faults_table", of_netlists=True),
-            "units_size": Section("tables:units_table", page="units.md", of_netlists=True),
-            "boards": Section("tables:boards_table", page="boards.md"),
-        },
+        sections=tables(
+            gateware=Section("tables:gateware_table", of_netlists=True),
+            faults=Section("tables:faults_table", of_netlists=True),
+            units_size=Section("tables:units_table", page="units.md", of_netlists=True),
+            boards=Section("tables:boards_table", page="boards.md"),
+        ),
         extra="boards",
     ),
     Study(
@@ -319,23 +243,16 @@ _ALL = (
         title="The fields of a Skin file",
         page="skin.md",
         minutes=0.1,
-        sections={
-            "fields": Section("tables:fields_table", sample="tables:fields_table"),
-        },
+        sections=tables(fields=Section("tables:fields_table", sample="tables:fields_table")),
     ),
     Study(
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",
         minutes=25,
-        sections={
-            "speed": Section("tables:speed_table"),
-            "reflex": Section("tables:reflex_table"),
-            "breaks": Section("tables:breaks_table"),
-            "scores": Section("tables:scores_table"),
-            "ahead": Section("tables:ahead_table"),
-            "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
-        },
+        sections=tables(
+            "speed reflex breaks scores ahead", recorded=Section("tables:recorded_table", needs=("../shared/data",))
+        ),
         pictures="tables:draw",
         extra="test",
     ),
@@ -344,19 +261,14 @@ _ALL = (
         title="Sweep times of pressure units",
         page="units.md",
         minutes=1,
-        sections={
-            "units": Section("tables:units_table", sample="tables:units_table"),
-        },
+        sections=tables(units=Section("tables:units_table", sample="tables:units_table")),
     ),
     Study(
         "view",
         title="Delay and load of the view in a browser",
         page="view.md",
         minutes=4,
-        sections={
-            "view_load": Section("tables:loads_table"),
-            "view_clicks": Section("tables:clicks_table"),
-        },
+        sections=tables(view_load=Section("tables:loads_table"), view_clicks=Section("tables:clicks_table")),
         compute="tables:compute",
         pictures="tables:draw",
         needs=("chromium",),

@@ -62,8 +62,6 @@ class Point:
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    least_mm: Interval | None = None
-    """Lower bound of any method's mean barycenter error here."""
 
 
 def study(

@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.chart import beside, front_picture, host, numbers, speed, times_picture
+from contactfpga_sim.lab.chart import front_picture, host, numbers, speed, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, covered, front, reached_us, study, to_build
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.methods import METHODS
@@ -27,7 +27,7 @@ def compute() -> list[Point]:
         Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
     ]
     with pool.executor() as executor, pool.progress() as step:
-        points = beside.bounded(study(tasks, executor, True, step), executor)
+        points = study(tasks, executor, True, step)
     numbers.write(map(host.timed, points), NUMBERS)
     return numbers.read(NUMBERS)
 

@@ -6,8 +6,6 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from contactfpga.design.cover import drawing, elastic, impact, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import GRAVITY, Arm
@@ -205,38 +203,13 @@ def _number(answer: float | NoSolution) -> float:
     return answer
 
 
-def _cell(error: float) -> str:
-    if math.isnan(error):
-        return "none"
-    if math.isinf(error) or abs(error) > 1e6:
-        return "infinite"
-    if abs(error) < formulas.FLOOR:
-        return "< 1e-13"
-    if abs(error) >= 1e-3:
-        return f"{100 * error:+.1f} %"
-    return f"{abs(error):.0e}"
-
-
-def rules_table() -> str:
-    rows = [["rule", *(blow.name for blow in formulas.BLOWS), "time"]]
-    for name, rule in formulas.RULES.items():
-        errors = formulas.relative_errors(rule)
-        with np.errstate(all="ignore"):
-            takes = 1e6 * formulas.seconds(lambda rule=rule: rule(formulas.BLOWS[0]))  # type: ignore[misc]
-        told = f"{takes:.1f}" if takes < 10 else f"{takes:,.0f}"
-        rows.append([name, *map(_cell, errors), f"{told} µs"])
-    return writer.table_of(rows)
-
-
 def sense_table() -> str:
     study = formulas
-    rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
+    rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES)]]
     for model in study.LADDER:
         for name, ball in study.BALLS.items():
-            sheet = study.PaddedSheet(study.SWITCH, study.THICKNESS_M, ball)
-            takes = 1e6 * study.seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore[misc]
             errors = ["0" if error == 0 else f"{100 * error:+.1f} %" for error in study.sense_errors(model, ball)]
-            rows.append([str(model), name, *errors, f"{takes:,.0f} µs"])
+            rows.append([str(model), name, *errors])
     return writer.table_of(rows)
 
 

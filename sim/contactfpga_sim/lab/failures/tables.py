@@ -1,13 +1,10 @@
-"""Tables and pictures of docs/failures.md."""
+"""Tables of docs/failures.md."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
-from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import knob_pictures
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.pool import progress
@@ -31,10 +28,9 @@ def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
 
 def rows(knob: Knob, methods: Mapping[str, Sweep]) -> list[tuple[str, ...]]:
     """A knob's rows, common cells in the first."""
-    title = f"[{knob.title}](#{knob.name})"
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
-        first = f"{title}: {knob.axis}" if number == 0 else ""
+        first = f"{knob.title}: {knob.axis}" if number == 0 else ""
         helps = knob.helps if number == 0 else ""
         closed = knob.format.format(knob.closed[method]) if method in knob.closed else ""
         holds, breaks, *rest = _cells(knob, sweep)
@@ -78,8 +74,8 @@ def says(knob: Knob, sweep: Sweep) -> str:
 UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
-EXPLAINED = tuple(f"#{name})" for name in ("diodes", "broken", "stuck", "silence"))
-"""Links of the knobs whose reason the page shows."""
+EXPLAINED = SHOWN[-4:]
+"""Knobs whose reason the page shows."""
 
 
 def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
@@ -89,29 +85,9 @@ def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
         where = [method for method, found in methods.items() if found.silent_at is not None]
         if where:
             knob = KNOBS[name]
-            lines.append((f"[{knob.title}](#{name})", ", ".join(where), knob.unnoticed))
-    return writer.Table(UNNOTICED, lines, lambda row: row[0].endswith(EXPLAINED), (UNNOTICED[0], UNNOTICED[2]))
-
-
-SAID = {
-    "capacity": "No picture: the frame carries eight zones, however many there are.",
-    "project_reversal": "No picture: with and without guard lines the limit is the same.",
-    "diodes_reversal": "The picture is that of [`diodes`](#diodes).",
-    "broken_reversal": "The picture is that of [`broken`](#broken).",
-    "stuck_reversal": "The picture is that of [`stuck`](#stuck), without a mask.",
-    "host": "No picture: beyond the limit, frames are lost and counted.",
-    "silence": "No picture: the newest frame is as old as the silence is long.",
-}
-
-
-def pictures() -> str:
-    return headed(KNOBS, "failures", SAID)
-
-
-def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> str:
-    """A heading per knob, and a picture from a folder of ``docs/images``, or a sentence."""
-    shown = {name: f"![{knob.title}](images/{folder}/{name}.svg)" for name, knob in knobs.items()} | dict(said)
-    return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
+            lines.append((knob.title, ", ".join(where), knob.unnoticed))
+    titles = [KNOBS[name].title for name in EXPLAINED]
+    return writer.Table(UNNOTICED, lines, lambda row: row[0] in titles, (UNNOTICED[0], UNNOTICED[2]))
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
@@ -122,14 +98,3 @@ def compute() -> dict[str, dict[str, Sweep]]:
         for name, knob in KNOBS.items():
             knob.sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
     return sweeps
-
-
-def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """Pictures in a folder of their own, without those that :data:`SAID` replaces."""
-    (folder / "failures").mkdir(exist_ok=True)
-    drawn = []
-    for name, methods in sweeps.items():
-        if name not in SAID:
-            drawn.append(folder / "failures" / f"{name}.svg")
-            write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
-    return drawn

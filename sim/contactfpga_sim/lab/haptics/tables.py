@@ -10,13 +10,11 @@ import matplotlib
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import knob_pictures, tables
-from contactfpga_sim.lab.failures.knob import Sweep
-from contactfpga_sim.lab.haptics import breaks, coverage, felt, pairs
+from contactfpga_sim.lab.failures import tables
+from contactfpga_sim.lab.haptics import breaks, coverage, felt
 from contactfpga_sim.lab.haptics.coverage import CoverageCase
 from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
@@ -78,14 +76,9 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def draw(folder: Path) -> list[Path]:
-    return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
-
-
 END_TO_END = 100
 """Contacts per line; `make campaign` presses 1,000 in all."""
 
-LIMITS = 1000
 APART_MM = (30.0, 60.0, 100.0)
 
 
@@ -115,22 +108,9 @@ def pairs_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row[1] == f"{APART_MM[1]:g} mm")
 
 
-def limits_table() -> str:
-    rows = [["how fingers are located", "error of a push", "95 % interval"]]
-    for method, errors in pairs.errors(60.0, LIMITS).items():
-        middle, low, high = interval(errors)
-        rows.append([method, f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
-    return writer.table_of(rows)
-
-
-@functools.cache
-def swept() -> dict[str, dict[str, Sweep]]:
-    return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
-
-
 def breaks_table() -> writer.Table:
     """The page shows knobs whose first method fails unnoticed."""
-    rows = [row for name, methods in swept().items() for row in tables.rows(breaks.KNOBS[name], methods)]
+    rows = [row for knob in breaks.KNOBS.values() for row in tables.rows(knob, knob.sweep())]
     return writer.Table(
         tables.HEAD,
         rows,
@@ -139,21 +119,9 @@ def breaks_table() -> writer.Table:
     )
 
 
-SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` reports every break."}
-
-
-def breaks_pictures() -> str:
-    return tables.headed(breaks.KNOBS, "haptics", SAID)
-
-
-def draw_felt(folder: Path) -> list[Path]:
-    drawn = [_front(folder / "haptics-front.svg")]
-    (folder / "haptics").mkdir(exist_ok=True)
-    for name in (one for one in breaks.KNOBS if one not in SAID):
-        path = folder / "haptics" / f"{name}.svg"
-        write_text(path, knob_pictures.svg(breaks.KNOBS[name], swept()[name]))
-        drawn.append(path)
-    return drawn
+def draw(folder: Path) -> list[Path]:
+    placed = rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M))
+    return [placed, _front(folder / "haptics-front.svg")]
 
 
 COLORS = (style.SKY, style.ORANGE, style.PURPLE, style.BLACK)

@@ -30,7 +30,7 @@ def add_flags(flag: flags.Flags) -> None:
     flag("--places N", places, numbers.whole(0, 10_000))
     flag("--skin FILE", "Skin of the sheet (default: the reference Skin).")
     flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
-    flag("--charts", "Draw force and thickness against latency instead.")
+    flag("--charts", "Draw force against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
     flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
