@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run

@@ -17,21 +17,10 @@ from study_pages import outdated
 from contactfpga.design.cover import Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import (
-    compute,
-    errors,
-    front_picture,
-    host,
-    numbers,
-    picture,
-    speed,
-    tables,
-    times,
-    times_picture,
-)
+from contactfpga_sim.apps import errors, kept, speed
+from contactfpga_sim.apps.errors import Blob
+from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.errors import Blob
 from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones

@@ -250,7 +250,7 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
 
 @pytest.mark.slow
 def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
-    from contactfpga_sim.lab import size
+    from contactfpga_sim.apps import size
     from contactfpga_sim.lab.closed import tables
 
     monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
-from contactfpga_sim.lab import meaning, pool, studies, writer
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab import meaning, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")

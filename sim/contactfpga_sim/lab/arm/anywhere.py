@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import covers
+from contactfpga_sim.apps import covers
 from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.latency import AROUND_S, latency_s
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.report import UNLIMITED
 from contactfpga_sim.lab.arm.run import run

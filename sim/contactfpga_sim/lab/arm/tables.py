@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactfpga_sim.apps.pool import executor, progress
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import anywhere, comply, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord, run
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 from contactfpga_sim.lab.arm.world import Faults
-from contactfpga_sim.lab.pool import executor, progress
 
 PLACES = (
     anywhere.PAPER,

@@ -15,9 +15,9 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
-from contactfpga_sim.lab.chart import errors, times
-from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.apps import errors, kept, size
+from contactfpga_sim.apps.errors import METRICS, Interval
+from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -49,9 +49,6 @@ KINDS = ("total", "labeller", "sensing")
 
 Found = dict[str, dict[str, list[float]]]
 """A value per scene, by kind and metric."""
-
-Look = tuple[np.ndarray, list[errors.Blob]]
-"""(R, C) bool pressed cells, and true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,7 +120,7 @@ def accuracy(task: Task, first: int) -> Found:
 
     def new() -> Found:
         scenes = _touches(task, first)
-        return compared((look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
+        return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
 
@@ -139,11 +136,7 @@ def _touches(task: Task, first: int) -> list[Scene]:
     return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, first=first)
 
 
-def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
-
-
-def compared(looks: Iterable[Look], skin: Skin) -> Found:
+def compared(looks: Iterable[errors.Look], skin: Skin) -> Found:
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):

@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from contactfpga import picture_style as style
+from contactfpga_sim.apps.covers import COVERS
 from contactfpga_sim.lab.chart.compute import Point, covered, front, reached_us
 from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.covers import COVERS
 
 MARKERS = "sv^oDp"
 

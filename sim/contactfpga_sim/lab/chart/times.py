@@ -14,8 +14,8 @@ import numpy as np
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart import errors, speed
-from contactfpga_sim.lab.chart.errors import Interval, Quantile
+from contactfpga_sim.apps import errors, speed
+from contactfpga_sim.apps.errors import Interval, Quantile
 from contactfpga_sim.model.scenes.scene import Scene
 
 HALVINGS = 14

@@ -16,7 +16,8 @@ from contactfpga import picture_style as style
 from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force
 from contactfpga.design.cover.press import SHEAR
-from contactfpga_sim.lab import covers, writer
+from contactfpga_sim.apps import covers
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.cover.elements import FoamOnCaps
 
 PITCHES_MM = (10.0, 6.4)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from contactfpga_sim.apps.pool import progress
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
-from contactfpga_sim.lab.pool import progress
 
 HEAD = (
     *("knob", "method", "holds until", "breaks at", "closed form"),

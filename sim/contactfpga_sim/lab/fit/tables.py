@@ -8,9 +8,10 @@ import sys
 
 from contactfpga.tools.commands.fit import add_flags, asked
 from contactfpga.tools.console.flags import Flags
-from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.fit import show
-from contactfpga_sim.lab.fit.search import fit
+from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.fit import show
+from contactfpga_sim.apps.fit.search import fit
+from contactfpga_sim.lab import writer
 
 SHOWN = ("too few scenes to tell", "the answer", "runner-up")
 """Ends of the verdicts that the page shows."""

@@ -16,7 +16,7 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
+from contactfpga_sim.apps import kept, size
 from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import FlipOutcome
 from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.flips import campaign, summary
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.summary import Design

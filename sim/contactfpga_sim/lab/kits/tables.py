@@ -19,11 +19,12 @@ from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, placed
-from contactfpga_sim.lab import latency, writer
-from contactfpga_sim.lab.finger import stages
-from contactfpga_sim.lab.finger.stages import Finger
-from contactfpga_sim.lab.spread import Spread
-from contactfpga_sim.lab.usb import BridgeSettings
+from contactfpga_sim.apps.latency import board as latency
+from contactfpga_sim.apps.latency import stages
+from contactfpga_sim.apps.latency.spread import Spread
+from contactfpga_sim.apps.latency.stages import Finger
+from contactfpga_sim.apps.latency.usb import BridgeSettings
+from contactfpga_sim.lab import writer
 
 NAMES = ("starter", "fast")
 SEEDS = (1, 2, 3, 4, 5)

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from contactfpga.skin.several import Several
-from contactfpga_sim.lab import kept, pool, writer
+from contactfpga_sim.apps import kept, pool
+from contactfpga_sim.lab import writer
 from contactfpga_sim.verify.mutants import campaign, proof
 from contactfpga_sim.verify.mutants.campaign import Result, chosen, examine
 from contactfpga_sim.verify.mutants.netlist import STAGES, Mutant

@@ -8,7 +8,8 @@ import numpy as np
 
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import latency, writer
+from contactfpga_sim.apps.latency import board as latency
+from contactfpga_sim.lab import writer
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
 

@@ -12,7 +12,8 @@ from contactfpga.skin.several import Several
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.apps import size
+from contactfpga_sim.lab import writer
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.trace import Trace

@@ -13,7 +13,8 @@ from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.apps import size
+from contactfpga_sim.lab import writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 FAST = Path("examples/fast.toml")

@@ -14,7 +14,7 @@ import numpy as np
 
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab import kept, pool
+from contactfpga_sim.apps import kept, pool
 from contactfpga_sim.lab.failures import rated
 from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_of
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours

@@ -82,8 +82,8 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
 
 
 def _anywhere(args: argparse.Namespace, case: Case, skin: Skin, count: int) -> anywhere.Found:
+    from contactfpga_sim.apps.pool import executor, progress
     from contactfpga_sim.lab.arm import anywhere, places
-    from contactfpga_sim.lab.pool import executor, progress
 
     places.check(case)
     ways = anywhere.ways(case, skin, 1e-6 * args.latency_us)
@@ -137,8 +137,8 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
 
 
 def _charts(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga_sim.apps.pool import executor, progress
     from contactfpga_sim.lab.arm import pictures, sweep
-    from contactfpga_sim.lab.pool import executor, progress
 
     pictures.check(case)
     folder = outputs.folder(args.output)

@@ -29,7 +29,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from contactfpga_sim.lab import pool
+    from contactfpga_sim.apps import pool
     from contactfpga_sim.lab.chart import host, picture, times_picture
     from contactfpga_sim.lab.chart import numbers as table
     from contactfpga_sim.lab.chart.compute import study

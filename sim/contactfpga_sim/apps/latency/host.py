@@ -20,10 +20,10 @@ import numpy as np
 
 import contactfpga
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import pool
-from contactfpga_sim.lab.latency import GOLDEN, Bench, RecordedTouch
-from contactfpga_sim.lab.spread import MixedTimes, Spread
-from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
+from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.latency.board import GOLDEN, Bench, RecordedTouch
+from contactfpga_sim.apps.latency.spread import MixedTimes, Spread
+from contactfpga_sim.apps.latency.usb import BridgeChip, BridgeSettings
 
 TOUCHES = 100
 

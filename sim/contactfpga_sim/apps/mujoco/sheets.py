@@ -19,9 +19,9 @@ from contactfpga.robot.body import Body, BodyError, JointHistory, Snapshot
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import States
 from contactfpga.surfaces.shapes import Floats
-from contactfpga_sim.lab.mujoco.touch import SheetTouch, by_finger, of_solver, on_sheet
-from contactfpga_sim.lab.mujoco.worn import SteppedPort, WornSheet
-from contactfpga_sim.lab.usb import BridgeSettings
+from contactfpga_sim.apps.latency.usb import BridgeSettings
+from contactfpga_sim.apps.mujoco.touch import SheetTouch, by_finger, of_solver, on_sheet
+from contactfpga_sim.apps.mujoco.worn import SteppedPort, WornSheet
 
 LEAD_S = 0.01
 """Time from the boards' power-up to MuJoCo's first step."""

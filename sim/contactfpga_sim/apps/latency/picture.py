@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab.finger.stages import PAPER_US, Finger
-from contactfpga_sim.lab.spread import Spread
+from contactfpga_sim.apps.latency.spread import Spread
+from contactfpga_sim.apps.latency.stages import PAPER_US, Finger
 
 EXACT, MEASURED, PAPER = style.BLUE, style.ORANGE, style.GRAY
 

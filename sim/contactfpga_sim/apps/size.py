@@ -16,7 +16,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.board.sizes import Device, Netlists, Size
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.model.board import native
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from contactfpga.design.cover import Cover
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart import errors
-from contactfpga_sim.lab.chart.compute import Look, look
+from contactfpga_sim.apps import errors
+from contactfpga_sim.apps.errors import Look, look
 from contactfpga_sim.model.scenes.contacts import Contact, Value
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
 from contactfpga_sim.model.scenes.file import SceneFile, scene_of

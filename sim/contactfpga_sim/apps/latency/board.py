@@ -10,8 +10,8 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.spread import MixedTimes, Spread
-from contactfpga_sim.lab.usb import ByteStream
+from contactfpga_sim.apps.latency.spread import MixedTimes, Spread
+from contactfpga_sim.apps.latency.usb import ByteStream
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import ReceivedFrame, Receiver
 

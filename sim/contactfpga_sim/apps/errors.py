@@ -10,9 +10,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import binom
 
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.model.golden import label, zones
 from contactfpga_sim.model.golden.frame import barycenter
+from contactfpga_sim.model.scenes.scene import Scene
 from contactfpga_sim.model.scenes.truth import Truth
 
 Z95 = 1.959963984540054
@@ -23,6 +25,10 @@ class Blob:
     area_mm2: float
     x_mm: float
     y_mm: float
+
+
+Look = tuple[np.ndarray, list[Blob]]
+"""(R, C) bool pressed cells, and true contacts."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +69,10 @@ def _pairs(found: Sequence[Blob], there: Sequence[Blob]) -> list[tuple[Blob, Blo
 
 def contacts(truth: Truth) -> list[Blob]:
     return [Blob(one.area_mm2, one.x_mm, one.y_mm) for one in truth.contacts]
+
+
+def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
+    return scene.pressed(seconds, skin, cover), contacts(scene.truth(seconds, skin))
 
 
 def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:

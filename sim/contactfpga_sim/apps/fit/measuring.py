@@ -11,14 +11,12 @@ from typing import Any
 from contactfpga.choices import labellers
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import errors, speed
-from contactfpga_sim.lab.chart.compute import Look
-from contactfpga_sim.lab.chart.errors import METRICS, Interval, interval
-from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.fit import faces, racing
-from contactfpga_sim.lab.fit.sources import Recorded, Source
-from contactfpga_sim.lab.fit.trial import FitTask
+from contactfpga_sim.apps import errors, kept, speed
+from contactfpga_sim.apps.errors import METRICS, Interval, Look, interval
+from contactfpga_sim.apps.fit import faces, racing
+from contactfpga_sim.apps.fit.sources import Recorded, Source
+from contactfpga_sim.apps.fit.trial import FitTask
+from contactfpga_sim.apps.speed import Speed
 
 Values = dict[str, list[float]]
 """Value per scene or fingertip touch, by metric."""

@@ -8,18 +8,17 @@ from typing import Any
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import latency
-from contactfpga_sim.lab.arm.parts import Usb
-from contactfpga_sim.lab.finger import host
-from contactfpga_sim.lab.finger.host import HostShare
-from contactfpga_sim.lab.latency import Latency
-from contactfpga_sim.lab.spread import MEDIAN, MOST, MixedTimes, Spread, summed
-from contactfpga_sim.lab.usb import BridgeSettings, delivered
+from contactfpga_sim.apps.latency import board as latency
+from contactfpga_sim.apps.latency import host
+from contactfpga_sim.apps.latency.board import Latency
+from contactfpga_sim.apps.latency.host import HostShare
+from contactfpga_sim.apps.latency.spread import MEDIAN, MOST, MixedTimes, Spread, summed
+from contactfpga_sim.apps.latency.usb import HOST_S, BridgeSettings, delivered
 
 PAPER_US = 6000.0
 """The paper's time from a touch to the decision to turn back."""
 
-ASSUMED_HOST_US = 1e6 * Usb().host_s
+ASSUMED_HOST_US = 1e6 * HOST_S
 """Time from the host's USB controller to the decision, as in ``contactfpga study arm``."""
 
 
@@ -77,10 +76,10 @@ def measure(
     host_touches: int = host.TOUCHES,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> Finger:
-    """The board's stages by :func:`contactfpga_sim.lab.latency.measure`, the bridge's over all phases, and the host's
-    over ``host_touches``, 0 for none.
+    """The board's stages by :func:`.board.measure`, the bridge's over all phases, and the host's over ``host_touches``,
+    0 for none.
 
-    Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~contactfpga_sim.lab.latency.Late`.
+    Raises ValueError for a contact that does not fit, :class:`TooFast`, and :class:`~.board.Late`.
     """
     chip = settings.chip
     if skin.baud > chip.max_baud:

@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contactfpga.design.cover import Cells, Cover, CoverError, Ellipse, Load, cells_of
-from contactfpga_sim.lab import covers
+from contactfpga_sim.apps import covers
 
 KINDS = ("caps", "tiles")
-"""Keys of :data:`contactfpga_sim.lab.covers.COVERS` that work with any switch."""
+"""Keys of :data:`contactfpga_sim.apps.covers.COVERS` that work with any switch."""
 
 DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
 

@@ -16,16 +16,12 @@ from contactfpga.robot.body.reader import LinkMemory
 from contactfpga.surfaces.shapes import Floats
 from contactfpga.tools.view.fingers import Finger
 from contactfpga.tracking.tracker import Tracker
-from contactfpga_sim.lab.arm.parts import Usb
-from contactfpga_sim.lab.mujoco.golden import GoldenBoard
-from contactfpga_sim.lab.mujoco.touch import SheetTouch
-from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings
+from contactfpga_sim.apps.latency.usb import HOST_S, BridgeChip, BridgeSettings
+from contactfpga_sim.apps.mujoco.golden import GoldenBoard
+from contactfpga_sim.apps.mujoco.touch import SheetTouch
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.scenes.felt import LoadedUnits
 from contactfpga_sim.model.scenes.scene import around_m
-
-HOST_S = Usb().host_s
-"""Time from the USB controller to the program, as in ``contactfpga study arm``."""
 
 POLL_S = 1e-6
 """Advance of the board, but not the robot, in a read without waiting."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from contactfpga.boards.spec import Bridge
 from contactfpga.driver.health import EVENT_CHAR, LATENCY_MS
-from contactfpga_sim.lab.spread import MixedTimes
+from contactfpga_sim.apps.latency.spread import MixedTimes
 
 STATUS_BYTES = 2
 """Status bytes at the start of each packet (AN232B-04)."""
@@ -36,6 +36,9 @@ BITS_PER_US = {False: 12, True: 480}
 DEFAULT_TIMER_MS = 16
 
 LONGEST_TIMER_MS = 255
+
+HOST_S = 0.1e-3
+"""Assumed time through the host's program to the controller."""
 
 _TICKS_PER_CLOCK = 16_000
 """Twice 8,000 microframes per second, so that midpoints are whole ticks."""

@@ -11,10 +11,10 @@ from typing import Any
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.fit.candidates import SHEET, Candidate
-from contactfpga_sim.lab.fit.cost import sized
-from contactfpga_sim.lab.fit.measuring import errors_of, exact, speed_of
-from contactfpga_sim.lab.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
+from contactfpga_sim.apps.fit.candidates import SHEET, Candidate
+from contactfpga_sim.apps.fit.cost import sized
+from contactfpga_sim.apps.fit.measuring import errors_of, exact, speed_of
+from contactfpga_sim.apps.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 
 CHECKED = 2
 """Touches of the answer that also go through the gateware."""

@@ -12,8 +12,8 @@ from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.choices.scans import SCANS
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin, SkinError
-from contactfpga_sim.lab.fit.faces import BARE, Faces, refusal
-from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
+from contactfpga_sim.apps.fit.faces import BARE, Faces, refusal
+from contactfpga_sim.apps.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:

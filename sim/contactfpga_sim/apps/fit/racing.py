@@ -12,7 +12,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from contactfpga_sim.lab.fit.trial import SHARES, Goals
+from contactfpga_sim.apps.fit.trial import SHARES, Goals
 
 FIRST = 20
 """Scenes in the first batch; looks double them."""

@@ -9,8 +9,8 @@ from concurrent.futures import Executor
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
-from contactfpga_sim.lab.fit.trial import SoFar, Step, Trial, gathered
+from contactfpga_sim.apps import kept, size
+from contactfpga_sim.apps.fit.trial import SoFar, Step, Trial, gathered
 
 DEVICE = sizes.UP5K
 
