@@ -18,8 +18,8 @@ from contactfpga.skin import Skin
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import electric, line, rated, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.line import Line
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 

@@ -11,8 +11,9 @@ from scipy.stats import binom
 from contactfpga.design.cover import Cells, Ellipse, Load, load_cover
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
+from contactfpga_sim.apps import stats as racing
 from contactfpga_sim.apps.covers import tiled
-from contactfpga_sim.apps.fit import faces, racing, search
+from contactfpga_sim.apps.fit import faces, search
 from contactfpga_sim.apps.fit.candidates import candidates
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals

@@ -9,10 +9,10 @@ from sample import sample
 from study_pages import section
 
 from contactfpga.robot.haptics import Contact, Plane, Touch
-from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.failures.tables import rows
 from contactfpga_sim.lab.haptics import breaks, felt, tables
 from contactfpga_sim.lab.haptics.breaks import KNOBS
+from contactfpga_sim.lab.knobs import Sweep
 
 ALL = [(name, method) for name, knob in KNOBS.items() for method in knob.runs]
 QUICK = [

@@ -12,8 +12,9 @@ from contactfpga.choices import labellers
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import errors, kept, speed
+from contactfpga_sim.apps import stats as racing
 from contactfpga_sim.apps.errors import METRICS, Interval, Look, interval
-from contactfpga_sim.apps.fit import faces, racing
+from contactfpga_sim.apps.fit import faces
 from contactfpga_sim.apps.fit.sources import Recorded, Source
 from contactfpga_sim.apps.fit.trial import FitTask
 from contactfpga_sim.apps.speed import Speed

@@ -10,7 +10,6 @@ import numpy as np
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
@@ -27,6 +26,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     still,
 )
+from contactfpga_sim.lab.knobs import Knob, Outcome
 from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import lines_of
 from contactfpga_sim.model.sheet.wiring import Wiring, at_rest

@@ -17,9 +17,9 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
+from contactfpga_sim.lab.knobs import Knob, Outcome
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 OVERSAMPLING = 16

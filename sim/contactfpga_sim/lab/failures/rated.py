@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contactfpga_sim.lab.failures.knob import Outcome
 from contactfpga_sim.lab.flips.campaign import wilson
+from contactfpga_sim.lab.knobs import Outcome
 
 LEVEL = 0.95
 """Share that must be right for a value to hold."""
@@ -19,7 +19,7 @@ Z = 2.5
 """z of Wilson's interval at each of four tests, for 95 % overall."""
 
 SHARE = "share of draws that are right"
-"""Meaning of :attr:`contactfpga_sim.lab.failures.knob.Outcome.amount` here."""
+"""Meaning of :attr:`contactfpga_sim.lab.knobs.Outcome.amount` here."""
 
 Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
 """Outcomes by value, random numbers and draws."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contactfpga_sim.apps.pool import progress
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures.catalogue import KNOBS
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 HEAD = (
     *("knob", "method", "holds until", "breaks at", "closed form"),

@@ -13,7 +13,6 @@ from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import kit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     REFERENCE,
@@ -26,6 +25,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     seen,
 )
+from contactfpga_sim.lab.knobs import Knob, Outcome
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene

@@ -18,10 +18,10 @@ from contactfpga.robot.haptics import Contact, Contacts, Cylinder, LoadCells, To
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import hexapod
 from contactfpga.surfaces.shapes import Floats
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
 from contactfpga_sim.lab.failures.rated import LOOKS, SHARE, Rated
 from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
+from contactfpga_sim.lab.knobs import Knob, Outcome
 
 HOLDS = 0.9
 """Required share of contacts within the stated interval, below 95 % to allow for chance."""

@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga.design.circuit import Circuit, patterns, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 SETTLE_US, PRECHARGE_US = 0.5, 0.25
 SIZE = 16
