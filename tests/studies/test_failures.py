@@ -15,8 +15,9 @@ from scipy.stats import fisher_exact
 from study_pages import outdated, section
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import electric, line, rated, tables, touch
+from contactfpga_sim.apps import stats
+from contactfpga_sim.lab import knobs, writer
+from contactfpga_sim.lab.failures import electric, line, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.failures.line import Line
 from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
@@ -221,10 +222,10 @@ def test_fingers_on_the_kit_are_told_apart_as_image_tools_count_them(turn, force
 def shown_rate(text):
     """Right draws and all of them, from the share and the interval that are shown."""
     share = float(re.match(r"[\d.]+", text)[0])
-    for of in rated.LOOKS:
+    for of in knobs.LOOKS:
         near = round(share * of / 100)  # the share is rounded
         for right in range(max(0, near - 1), min(of, near + 1) + 1):
-            if str(rated.Rate(right, of)) == text:
+            if knobs.words(stats.Rate(right, of)) == text:
                 return right, of
     raise AssertionError(text)
 
@@ -364,7 +365,7 @@ def test_a_rate_is_judged_wrong_at_most_once_in_twenty(share, wrong):
     def draws(value, rng, count):
         return [Outcome(bool(right)) for right in rng.random(count) < share]
 
-    verdicts = [rated.Rated(draws, seed)(0.0).right for seed in range(300)]
+    verdicts = [knobs.Rated(draws, seed)(0.0).right for seed in range(300)]
     assert verdicts.count(not wrong) <= 15 + 3 * 15**0.5
 
 
@@ -373,7 +374,7 @@ def test_of_many_draws_the_wrong_one_that_is_not_told_is_shown():
     right = Outcome(True, ("motion",), "right")
 
     def of(*each):
-        return rated.Rated(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
+        return knobs.Rated(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
 
     assert (of().right, of().told, of().what, of().rate) == (True, ("motion",), "right", "100 % (95.0 to 100.0)")
     assert of(*[told] * 20).told == ("row N open",)
@@ -406,6 +407,6 @@ NEVER = "fails at the first value"
     ],
 )
 def test_lines_of_the_table(verdicts, expected):
-    knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
+    knob = Knob("x", "X", "x", tuple(range(len(verdicts))), {}, "it helps")
     (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
     assert line[1:-1] == ("method", *expected)

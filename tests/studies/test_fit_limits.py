@@ -8,12 +8,12 @@ from scipy.stats import binomtest
 
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import speed
-from contactfpga_sim.apps.errors import Interval
 from contactfpga_sim.apps.fit import search
 from contactfpga_sim.apps.fit.candidates import METHODS, candidates, pitches_for, size_for
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals, Measurement
 from contactfpga_sim.apps.speed import Speed
+from contactfpga_sim.apps.stats import Interval
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -239,7 +239,7 @@ def test_numbers_are_read_back_as_they_were_written(tmp_path):
     ]
     campaign.write(rows, tmp_path / "flips.csv")
     assert campaign.read(tmp_path / "flips.csv") == rows
-    assert summary.share(rows).interval == pytest.approx((0.095, 0.905), abs=5e-4)
+    assert summary.share(rows).interval() == pytest.approx((0.095, 0.905), abs=5e-4)
     assert summary.wrong_ms(rows) == (250.0, 250.0)
 
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import binom
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
@@ -16,8 +15,6 @@ from contactfpga_sim.model.golden import label, zones
 from contactfpga_sim.model.golden.frame import barycenter
 from contactfpga_sim.model.scenes.scene import Scene
 from contactfpga_sim.model.scenes.truth import Truth
-
-Z95 = 1.959963984540054
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,50 +96,3 @@ def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
     area, *sums = moments
     x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
     return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
-
-
-@dataclasses.dataclass(frozen=True)
-class Interval:
-    """A mean with its 95 % interval."""
-
-    mean: float
-    low: float
-    high: float
-    count: int
-
-
-def interval(values: Sequence[float]) -> Interval:
-    """Interval of values without NaN: normal, or Wilson's for shares 0 or 1."""
-    known = np.array([value for value in values if not math.isnan(value)], float)
-    n = len(known)
-    if not n:
-        return Interval(math.nan, math.nan, math.nan, 0)
-    mean = float(known.mean())
-    if np.isin(known, (0.0, 1.0)).all():
-        center = (mean + Z95**2 / (2 * n)) / (1 + Z95**2 / n)
-        half = Z95 / (1 + Z95**2 / n) * math.sqrt(mean * (1 - mean) / n + Z95**2 / (4 * n**2))
-        return Interval(mean, max(0.0, center - half), min(1.0, center + half), n)
-    half = Z95 * float(known.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
-    return Interval(mean, mean - half, mean + half, n)
-
-
-@dataclasses.dataclass(frozen=True)
-class Quantile:
-    value: float
-    low: float
-    high: float
-    """Upper end of the interval; infinite if there are too few values."""
-    count: int
-
-
-def quantile(values: Sequence[float], share: float) -> Quantile:
-    """Least value that at least this share does not exceed; infinite values count. The interval is by ranks
-    (binomial), for any distribution."""
-    ordered = sorted(values)
-    n = len(ordered)
-    if not n:
-        return Quantile(math.nan, math.nan, math.nan, 0)
-    lower, upper = (int(binom.ppf(end, n, share)) for end in (0.025, 0.975))
-    low = ordered[lower - 1] if lower else 0.0  # times are not negative
-    high = ordered[upper] if upper < n else math.inf
-    return Quantile(ordered[max(1, math.ceil(share * n - 1e-9)) - 1], low, high, n)

@@ -11,13 +11,19 @@ from typing import Any
 from contactfpga.choices import labellers
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import errors, kept, speed
-from contactfpga_sim.apps import stats as racing
-from contactfpga_sim.apps.errors import METRICS, Interval, Look, interval
+from contactfpga_sim.apps import errors, kept, speed, stats
+from contactfpga_sim.apps.errors import METRICS, Look
 from contactfpga_sim.apps.fit import faces
 from contactfpga_sim.apps.fit.sources import Recorded, Source
-from contactfpga_sim.apps.fit.trial import FitTask
+from contactfpga_sim.apps.fit.trial import SHARES, FitTask, Goals
 from contactfpga_sim.apps.speed import Speed
+from contactfpga_sim.apps.stats import Interval, interval
+
+FIRST = 20
+"""Scenes in the first batch; looks double them."""
+
+ERR = 0.025
+"""Error probability of a side, over all looks."""
 
 Values = dict[str, list[float]]
 """Value per scene or fingertip touch, by metric."""
@@ -29,7 +35,7 @@ def errors_of(
     """Errors by metric of each Skin's zones, on one sheet and cover. ``others``: on all scenes reserved for the
     report, else on as many as a decision needs. All frames of a recording count."""
     count = source.most(task.count)
-    ends = [count] if others or isinstance(source, Recorded) else racing.ends(count)
+    ends = [count] if others or isinstance(source, Recorded) else stats.looks(FIRST, count)
     values: list[Values] = [{} for _ in skins]
     left = list(range(len(skins)))
     for first, last in itertools.pairwise([0, *ends]):
@@ -38,10 +44,24 @@ def errors_of(
         for one, found in zip(left, batch, strict=True):
             for metric, more in found.items():
                 values[one].setdefault(metric, []).extend(more)
-        left = [one for one in left if racing.decided(task.goals, values[one], len(ends)) is None]
+        left = [one for one in left if decided(task.goals, values[one], len(ends)) is None]
         if not left:
             break
     return [{metric: interval(each) for metric, each in one.items()} for one in values]
+
+
+def decided(goals: Goals, values: Values, looks: int) -> bool | None:
+    """Whether all limits are met; None: more scenes are needed. Each side errs with at most :data:`ERR`, shared by all
+    looks."""
+    met = True
+    for name, limit in goals.limits():
+        if name not in values:
+            continue
+        low, high = stats.bounds(values[name], ERR / looks, name in SHARES)
+        if low > limit:
+            return False
+        met &= high <= limit
+    return True if met else None
 
 
 def _batch(

@@ -11,10 +11,10 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import covers
+from contactfpga_sim.apps.stats import wilson
 from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
-from contactfpga_sim.lab.flips.campaign import wilson
 
 TOUCHES = 120
 

@@ -15,8 +15,9 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import errors, kept, size
-from contactfpga_sim.apps.errors import METRICS, Interval
+from contactfpga_sim.apps import errors, kept, size, stats
+from contactfpga_sim.apps.errors import METRICS
+from contactfpga_sim.apps.stats import Interval
 from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
@@ -110,7 +111,7 @@ def _sized(point: Point, size: sizes.Size) -> Point:
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     return {
-        kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
 

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.apps.errors import METRICS, Interval, Quantile
+from contactfpga_sim.apps.errors import METRICS
+from contactfpga_sim.apps.stats import Interval, Quantile
 from contactfpga_sim.lab.chart.compute import KINDS, Point, Task
 from contactfpga_sim.lab.chart.methods import METHODS, Method
 from contactfpga_sim.lab.chart.times import Times

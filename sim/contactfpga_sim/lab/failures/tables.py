@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contactfpga_sim.apps.pool import progress
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.failures.catalogue import KNOBS
 from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
@@ -91,10 +90,4 @@ def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
-    """Sweep the knobs in turn."""
-    sweeps: dict[str, dict[str, Sweep]] = {}
-    runs = sum(len(knob.runs) for knob in KNOBS.values())
-    with progress() as step:
-        for name, knob in KNOBS.items():
-            knob.sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
-    return sweeps
+    return knobs.sweeps("contactfpga_sim.lab.failures.catalogue")

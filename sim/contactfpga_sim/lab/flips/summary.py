@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
+from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab.flips import campaign
-from contactfpga_sim.lab.flips.campaign import Row, wilson
+from contactfpga_sim.lab.flips.campaign import Row
 from contactfpga_sim.model.board.state import StateBoard
 
 
@@ -20,15 +21,6 @@ class Design(NamedTuple):
     registers: int
     """Flip-flop bits, including those around memories."""
     memories: int
-
-
-class Share(NamedTuple):
-    hits: int
-    of: int
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        return wilson(self.hits, self.of)
 
 
 def measured(names: Iterable[str]) -> list[Design]:
@@ -59,8 +51,8 @@ def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
     return [row for row in rows if row.design == design and row.found.memory == memory]
 
 
-def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
-    return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
+def share(rows: Sequence[Row], outcome: str = "silent") -> Rate:
+    return Rate(sum(row.found.outcome == outcome for row in rows), len(rows))
 
 
 def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:

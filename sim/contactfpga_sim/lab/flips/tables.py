@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from contactfpga import picture_style as style
 from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.flips import campaign, summary
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
@@ -82,7 +83,7 @@ def _worst(rows: Sequence[Row]) -> str:
     silent = summary.share(rows)
     wrong = [row for row in rows if row.found.outcome == "silent"]
     worst = max(wrong or rows, key=_seconds)
-    long = summary.Share(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
+    long = Rate(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
     what = (
         f"one of `{worst.found.name}` in `{worst.design}` was silently wrong for {1e3 * worst.found.seconds:,.1f} ms "
         f"({worst.found.kind}). "
@@ -120,8 +121,8 @@ def designs_table(found: FlipResults) -> writer.Table:
     return writer.Table(COLUMNS, lines, lambda row: row in shown, columns)
 
 
-def _interval(share: summary.Share) -> str:
-    low, high = share.interval
+def _interval(share: Rate) -> str:
+    low, high = share.interval()
     return f"{100 * low:.1f} to {100 * high:.1f} %"
 
 
@@ -136,7 +137,7 @@ def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
         axes = figure.subplots()
         for row, design in enumerate(shown):
             share = summary.share(summary.of(rows, design.name, memory=False))
-            low, high = (100 * end for end in share.interval)
+            low, high = (100 * end for end in share.interval())
             color = style.BLUE if design in plain else style.VERMILLION
             axes.plot([low, high], [row, row], color=color, lw=2)
             axes.plot(100 * share.hits / share.of, row, "o", ms=7, color=color, clip_on=False, zorder=3)

@@ -12,7 +12,7 @@ import numpy as np
 from contactfpga import picture_style as style
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.failures import tables
 from contactfpga_sim.lab.haptics import breaks, coverage, felt
 from contactfpga_sim.lab.haptics.coverage import CoverageCase
@@ -110,7 +110,8 @@ def pairs_table() -> writer.Table:
 
 def breaks_table() -> writer.Table:
     """The page shows knobs whose first method fails unnoticed."""
-    rows = [row for knob in breaks.KNOBS.values() for row in tables.rows(knob, knob.sweep())]
+    swept = knobs.sweeps(breaks.__name__)
+    rows = [row for name, methods in swept.items() for row in tables.rows(breaks.KNOBS[name], methods)]
     return writer.Table(
         tables.HEAD,
         rows,

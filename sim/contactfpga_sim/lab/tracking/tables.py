@@ -12,7 +12,8 @@ from contactfpga import picture_style as style
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import knobs, writer
+from contactfpga_sim.lab.knobs import Knob, Sweep
 from contactfpga_sim.lab.speed.driver import frame, greeting
 from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
 
@@ -118,21 +119,24 @@ def recorded_table() -> writer.Table:
 BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the next", "closed form", "what helps")
 
 
-def breaks_table() -> str:
-    found = breaks.sweeps()
-    return writer.table_of([BREAKS, *(row for name in found for row in break_rows(breaks.KNOBS[name], found[name]))])
+def breaks_table() -> writer.Table:
+    """The page shows the first method of each knob."""
+    swept = knobs.sweeps(breaks.__name__)
+    rows = [row for name, methods in swept.items() for row in break_rows(breaks.KNOBS[name], methods)]
+    return writer.Table(BREAKS, rows, lambda row: row[0], (BREAKS[0], BREAKS[2], BREAKS[6]))
 
 
-def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator[tuple[str, ...]]:
+def break_rows(knob: Knob, found: Mapping[str, Sweep]) -> Iterator[tuple[str, ...]]:
     """A knob's lines; common cells are only in the first."""
-    for number, (method, rates) in enumerate(found.items()):
-        held = [(value, rate) for value, rate in rates if breaks.holds(rate)]
-        until, there = (f"**{held[-1][0]:g}**", str(held[-1][1])) if held else ("nowhere", "")
-        if len(held) == len(rates):
-            until += ", all there are"
-        after = f"{rates[-1][0]:g}: {rates[-1][1]}" if len(held) < len(rates) else ""
+    for number, (method, sweep) in enumerate(found.items()):
+        held = len(sweep.values) if sweep.broken is None else sweep.broken
+        until = f"**{sweep.values[held - 1]:g}**" if held else "nowhere"
+        until += ", all there are" if sweep.broken is None else ""
+        there = sweep.outcomes[held - 1].rate if held else ""
+        after = "" if sweep.broken is None else f"{sweep.breaks_at:g}: {sweep.outcomes[sweep.broken].rate}"
+        closed = f"{knob.closed[method]:g}" if method in knob.closed else ""
         first = (f"{knob.title}: {knob.axis}", knob.helps) if number == 0 else ("", "")
-        yield first[0], method, until, there, after, knob.closed.get(method, ""), first[1]
+        yield first[0], method, until, there, after, closed, first[1]
 
 
 def speed_table() -> str:
