@@ -1,6 +1,7 @@
 """The studies: each section of a page has one owner and shows what its study makes; a toy study is made, listed and
 found out of date."""
 
+import csv
 import functools
 import inspect
 import re
@@ -13,8 +14,8 @@ from study_pages import DOCS, section
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import beside, meaning, studies, writer
-from contactfpga_sim.lab.registry import NO_ROW, Section, Study, StudyRun
+from contactfpga_sim.lab import meaning, studies, writer
+from contactfpga_sim.lab.registry import Section, Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
 ROOT = DOCS.parent
@@ -32,17 +33,17 @@ PLACES = [
 SECTIONS = [(study.name, name, section) for study in DECLARED for name, section in study.sections.items()]
 QUICK = {"cover", "failures", "haptics", "kits", "maker", "safety", "settle", "skin", "units"}
 """Studies whose samples `make test` makes; the other samples are for `make test-all`."""
-WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "mujoco observer", "performance",
+WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "performance",
          "safety", "tracking scores"}  # fmt: skip
 """Studies, and sections, that `make campaign` makes whole; of a section that is named no sample is made."""
 SHOWN = [
     *(
-        pytest.param(study, name, section.sample, marks=() if study in QUICK else pytest.mark.slow)
+        pytest.param(study, name, "sampled", marks=() if study in QUICK else pytest.mark.slow)
         for study, name, section in SECTIONS
         if section.sample and f"{study} {name}" not in WHOLE
     ),
     *(
-        pytest.param(study, name, section.makes, marks=(pytest.mark.campaign, pytest.mark.timeout(7200)))
+        pytest.param(study, name, "text", marks=(pytest.mark.campaign, pytest.mark.timeout(7200)))
         for study, name, section in SECTIONS
         if {study, f"{study} {name}"} & WHOLE
     ),
@@ -92,14 +93,14 @@ def run_of(study):
     return StudyRun(STUDIES[study])
 
 
-@pytest.mark.parametrize(("study", "name", "place"), SHOWN)
-def test_a_page_shows_what_its_study_makes(study, name, place):
+@pytest.mark.parametrize(("study", "name", "how"), SHOWN)
+def test_a_page_shows_what_its_study_makes(study, name, how):
     """A sample of the section, or all of it."""
     declared = STUDIES[study]
     absent = runner.lacking((*declared.needs, *declared.sections[name].needs))
     if absent:
         pytest.skip(f"needs {', '.join(absent)}")
-    made = run_of(study).call(place)
+    made = getattr(run_of(study), how)(name)
     assert f"\n{made}\n" in f"\n{section(declared.page_of(name), name)}\n"
 
 
@@ -110,19 +111,14 @@ def test_a_page_shows_the_pictures_that_its_study_draws(study, tmp_path):
         assert picture.read_bytes() == (DOCS / "images" / picture.name).read_bytes(), picture.name
 
 
-MOST_ROWS = 20
-"""Of a table that a command writes into a page: one for each number of the paper."""
-READ_WHOLE = {"skin.md: fields"}
+MOST_ROWS = 8
+READ_WHOLE = {"fields"}
 """A reader looks up any row of these."""
 
 
-def test_long_tables_are_in_files_beside_the_pages():
-    rows = {
-        f"{study.page_of(name)}: {name}": longest(writer.sections((DOCS / study.page_of(name)).read_text())[name].text)
-        for study in DECLARED
-        for name in study.sections
-    }
-    assert {name for name, count in rows.items() if count > MOST_ROWS} == READ_WHOLE
+def shown(study, name):
+    """The section's text as the page has it."""
+    return writer.sections((DOCS / study.page_of(name)).read_text(encoding="utf-8"))[name].text
 
 
 def longest(text):
@@ -130,32 +126,45 @@ def longest(text):
     return max((table.count("\n") - 2 for table in re.findall(r"(?:^\|.*\|\n)+", f"{text}\n", re.MULTILINE)), default=0)
 
 
+def file_of(study, name):
+    return f"{Path(study.page_of(name)).stem}-{name}.csv"
+
+
 @pytest.mark.parametrize(
     ("study", "name"),
-    [(study, name) for study in DECLARED for name, section in study.sections.items() if section.kept or section.heads],
+    [(study, name) for study in DECLARED for name in study.sections],
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
-def test_a_page_keeps_what_its_study_declares(study, name, tmp_path):
-    page = study.page_of(name)
-    file = tmp_path / f"{Path(page).stem}-{name}.csv"
-    declared = study.sections[name]
-    text = beside.part(section(page, name), declared.kept, file, declared.heads)
-    assert text == writer.sections((DOCS / page).read_text())[name].text
-    assert file.read_text() == (DOCS / beside.FOLDER / file.name).read_text()
-    assert (longest(text) < longest(section(page, name))) == bool(declared.kept)
-    assert (" columns](" in text) == bool(declared.heads)
-    assert bool(longest(text)) == (declared.kept != NO_ROW)
+def test_a_section_shows_a_picture_or_at_most_eight_rows(study, name):
+    """Of a table in a file at least three rows, which are there, too."""
+    text = shown(study, name)
+    assert longest(text) <= MOST_ROWS or name in READ_WHOLE
+    if f"({writer.FOLDER}/{file_of(study, name)})" in text:
+        with open(DOCS / writer.FOLDER / file_of(study, name), newline="", encoding="utf-8") as file:
+            head, *rows = list(csv.reader(file))
+        lines = text.partition("\n\nAll [")[0].splitlines()
+        cells, *page = [line[2:-2].split(" | ") for line in lines if line.startswith("| ")]
+        columns = [at for at, title in enumerate(head) if title in cells]
+        assert len(columns) == len(cells)
+        assert len(page) >= 3
+        assert (len(page), len(cells)) != (len(rows), len(head))
+        picked = iter([[row[at] for at in columns] for row in rows])
+        assert all(row in picked for row in page)
 
 
-MEASURED_ONCE = {f"rivals-{name}.csv" for name in ("rivals", "rivals_exact", "rivals_made_of")}
+MEASURED_ONCE = {"rivals-rivals.csv", "rivals-rivals_exact.csv", "rivals-rivals_made_of.csv", "chart-other_ways.csv"}
 WRITTEN_ELSEWHERE = MEASURED_ONCE | {"formal-claims.csv", "mutants-alive.csv", "verification.csv"}
 """By hand, by `make verification`, and from what scripts/rivals.py prints."""
 
 
 def test_each_file_beside_the_pages_belongs_to_a_section():
-    kept = {f"{Path(study.page_of(name)).stem}-{name}.csv" for study in DECLARED for name in study.sections
-            if study.sections[name].kept or study.sections[name].heads}  # fmt: skip
-    assert {path.name for path in (DOCS / beside.FOLDER).iterdir()} == kept | WRITTEN_ELSEWHERE
+    linked = {
+        file_of(study, name)
+        for study in DECLARED
+        for name in study.sections
+        if f"({writer.FOLDER}/{file_of(study, name)})" in shown(study, name)
+    }
+    assert {path.name for path in (DOCS / writer.FOLDER).iterdir()} == linked | WRITTEN_ELSEWHERE
 
 
 # ---- a toy study: its declaration and its function
@@ -241,7 +250,7 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
 
 @pytest.mark.slow
 def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
-    from contactfpga_sim.lab import size
+    from contactfpga_sim.apps import size
     from contactfpga_sim.lab.closed import tables
 
     monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
-from contactfpga_sim.lab import beside, meaning, pool, studies, writer
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab import meaning, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
@@ -49,10 +50,9 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
         if absent := lacking(section.needs):
             print(f"{page}: {name} stays as it is without {', '.join(absent)}", flush=True)
             continue
-        text = run.text(name)
-        if section.kept or section.heads:
-            file = DOCS / beside.FOLDER / f"{Path(page).stem}-{name}.csv"
-            text = beside.part(text, section.kept, file, section.heads)
+        made = run.made(name)
+        file = DOCS / writer.FOLDER / f"{Path(page).stem}-{name}.csv"
+        text = made.on_page(file) if isinstance(made, writer.Table) else writer.spelled(made)
         writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
         print(f"{page}: {name}", flush=True)
     if study.pictures:

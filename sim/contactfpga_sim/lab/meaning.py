@@ -26,7 +26,7 @@ def fingerprint(study: Study, section: str) -> str:
 
 
 def _netlists(study: Study, section: str) -> list[str]:
-    from contactfpga_sim.lab import size
+    from contactfpga_sim.apps import size
 
     with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
         StudyRun(study).text(section)

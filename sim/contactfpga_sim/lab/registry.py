@@ -17,28 +17,26 @@ from typing import Any
 
 from contactfpga_sim.lab import writer
 
-NO_ROW = "^$"
-""":attr:`Section.kept` of a page that only links to the table."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Section:
     """Text between two markers of a page."""
 
     makes: str
-    """The function of its text, of the study's result or of nothing."""
+    """The function of its text or :class:`~contactfpga_sim.lab.writer.Table`, of the study's result or of nothing."""
     page: str = ""
     """Page in ``docs``; empty: the study's."""
     needs: tuple[str, ...] = ()
     """Needs beyond :attr:`Study.needs`; without one the section stays."""
     sample: str = ""
     """Function without arguments that makes part of the text in less than a minute."""
-    kept: str = ""
-    """Regular expression of rows to keep of its longest table; empty: all."""
-    heads: str = ""
-    """Regular expression of column headers to keep; empty: all."""
     of_netlists: bool = False
     """Whether netlists (:mod:`.size`), not reached code, date it."""
+
+
+def tables(names: str = "", **others: Section) -> dict[str, Section]:
+    """Sections by marker: of ``names`` each is made by ``tables:NAME_table``, and then ``others``."""
+    return {name: Section(f"tables:{name}_table") for name in names.split()} | others
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,13 +91,20 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """Call a function; text is returned as pages spell it."""
+        """Call a function, with the study's result if it takes one."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)
-        found = function(*given, *([self.computed] if wanted > len(given) else []))
-        return writer.spelled(found) if isinstance(found, str) else found
+        return function(*given, *([self.computed] if wanted > len(given) else []))
+
+    def made(self, section: str) -> str | writer.Table:
+        found: str | writer.Table = self.call(self.study.sections[section].makes)
+        return found
 
     def text(self, section: str) -> str:
-        text: str = self.call(self.study.sections[section].makes)
-        return text
+        """All of the section's text, as pages spell it."""
+        return writer.spelled(str(self.made(section)))
+
+    def sampled(self, section: str) -> str:
+        """The part of the text that the section's sample makes."""
+        return writer.spelled(str(self.call(self.study.sections[section].sample)))

@@ -15,9 +15,10 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
-from contactfpga_sim.lab.chart import errors, times
-from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.apps import errors, kept, size, stats
+from contactfpga_sim.apps.errors import METRICS
+from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -50,9 +51,6 @@ KINDS = ("total", "labeller", "sensing")
 Found = dict[str, dict[str, list[float]]]
 """A value per scene, by kind and metric."""
 
-Look = tuple[np.ndarray, list[errors.Blob]]
-"""(R, C) bool pressed cells, and true contacts."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Point:
@@ -62,8 +60,6 @@ class Point:
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    least_mm: Interval | None = None
-    """Lower bound of any method's mean barycenter error here."""
 
 
 def study(
@@ -115,7 +111,7 @@ def _sized(point: Point, size: sizes.Size) -> Point:
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     return {
-        kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
 
@@ -125,7 +121,7 @@ def accuracy(task: Task, first: int) -> Found:
 
     def new() -> Found:
         scenes = _touches(task, first)
-        return compared((look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
+        return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
 
@@ -141,12 +137,7 @@ def _touches(task: Task, first: int) -> list[Scene]:
     return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, task.cover, first=first)
 
 
-def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    on = scene.on_cover(skin, cover)
-    return on.pressed(seconds, skin, cover), errors.contacts(on.truth(seconds, skin))
-
-
-def compared(looks: Iterable[Look], skin: Skin) -> Found:
+def compared(looks: Iterable[errors.Look], skin: Skin) -> Found:
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.covers import COVERS, DOME, tiled
+from contactfpga_sim.apps.covers import COVERS, DOME, tiled
 
 EXTENT_MM = 160.0
 
@@ -18,7 +18,7 @@ PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Closing forces besides :data:`contactfpga_sim.lab.covers.DOME`'s 0.4 N."""
+"""Closing forces besides :data:`contactfpga_sim.apps.covers.DOME`'s 0.4 N."""
 
 MOST_ZONES = 32
 """Zones per frame, enough here; more would need longer row times on the finest sheets."""

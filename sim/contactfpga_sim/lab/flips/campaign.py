@@ -16,7 +16,7 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
+from contactfpga_sim.apps import kept, size
 from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import FlipOutcome
 from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference
@@ -138,11 +138,3 @@ def _row(line: dict[str, str]) -> Row:
         fights=int(line["fights"]),
     )
     return Row(line["design"], found)
-
-
-def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    share, part = hits / of, z * z / of
-    middle = (share + part / 2) / (1 + part)
-    half = z * math.sqrt(share * (1 - share) / of + part / 4 / of) / (1 + part)
-    return max(0.0, middle - half), min(1.0, middle + half)

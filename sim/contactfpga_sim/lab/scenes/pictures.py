@@ -47,7 +47,7 @@ def panels() -> list[Panel]:
     close = _square(18, 2.5)
     pair = Scene(contacts.pair(7.0, 6.0, 21.0, 21.5, 30.0, force_n=20.0))
     switch = Switch(0.32, 4e-6)  # closes at the stress of the paper's, whose face is wider than this pitch
-    names = {"patch": "patch", "point": "point force", "hertz": "patch's pressure", "bonded": "bonded layer"}
+    names = {"patch": "patch", "point": "point force", "foam": "foam, 5 mm"}
     return drawn + [
         Panel(text, "20 N each, pitch 2.5 mm", pair, close, Cover(model, switch=switch))
         for model, text in names.items()
