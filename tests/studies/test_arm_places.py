@@ -10,7 +10,7 @@ from arm_oracle import STIFFNESS, paper_set
 from scipy.optimize import brentq
 from scipy.stats import binom
 
-from contactfpga.design.cover import Ball, cells_of
+from contactfpga.design.cover import BODIES, cells_of
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import kept
@@ -19,7 +19,7 @@ from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geom
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Peaks
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.world import Switches, pressed
+from contactfpga_sim.lab.arm.world import Switches, shares
 
 RUN = {"step_s": 25e-6, "lead_s": 0.25e-3, "duration_s": 0.03}
 RIGID = {"spread": 0.0, "travel_m": 0.0}
@@ -91,10 +91,12 @@ def test_a_run_to_its_peak_has_the_whole_runs_peak():
 
 def test_forces_between_those_looked_at_follow_the_cells_themselves():
     case = Geometry("flush", 10.0, 1.0, 5.0).case().but(touch=({"x_mm": 83.0, "y_mm": 81.0},))
-    switches, ball = Switches(case, Skin()), Ball(0.038, 3.45e5 / 0.75)
+    switches, cells = Switches(case, Skin()), cells_of(case.cover, 16, 16, 0.01, 0.01)
+    rigid = BODIES["rigid"]
+    indentation = cells.indentation([rigid.ball(0.038)], rigid)
     for force in (0.5, 3.33, 17.1):
         found = switches.forces_n((force,))
-        exact = force * pressed(cells_of(case.cover, 16, 16, 0.01, 0.01), 83.0, 81.0, ball.patch_m(force))
+        exact = force * shares(cells, indentation, 83.0, 81.0, force)
         assert found == pytest.approx(exact, abs=2e-3 * exact.max())
 
 

@@ -84,9 +84,9 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
         ('like = "paper"\n[arm]\n', "unknown part 'arm'"),
         ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
         ('like = "paper"\n[foam]\ncut = true\n', "the model 'point' knows no cut"),
-        ('like = "paper"\nmodel = "hertz"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
-        ('like = "paper"\nmodel = "hertz"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
-        ('like = "paper"\nmodel = "hertz"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
+        ('like = "paper"\nmodel = "foam"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
+        ('like = "paper"\nmodel = "foam"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
+        ('like = "paper"\nmodel = "foam"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
         ('like = "paper"\n[cap]\nside = 1\n', "unknown key 'side' in [cap]"),
         ('like = "paper"\n[control]\nbehavior = "flee"\n', "behavior is 'flee'; it must be one of reverse, comply"),
         (

@@ -20,10 +20,10 @@ import numpy as np
 
 from contactfpga.design.cover import medium, point
 from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
-from contactfpga.design.cover.layers import Body, Indentation
+from contactfpga.design.cover.layers import Body
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Part
-from contactfpga.design.cover.press import Cover, Load
+from contactfpga.design.cover.press import Cover, Indenter, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
 """Limits of grid steps per pitch; between them, two per foam thickness and six per face."""
@@ -74,7 +74,7 @@ class Cells:
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
-    def indentation(self, parts: Sequence[Part], body: Body) -> Indentation:
+    def indentation(self, parts: Sequence[Part], body: Body) -> Indenter:
         """A body's parts on these switches' cover."""
         pitch_y_m, pitch_x_m = self._pitches
         return self.cover.indentation(parts, body, pitch_x_m, pitch_y_m)

@@ -77,7 +77,3 @@ class MovingBody:
         parts = self.indentation.parts_at(SHALLOW_M * FINE**level)
         y_m, x_m = (pitch * (self._around + at / PLACES) for pitch, at in zip(self._pitches, (row, column)))
         return self._cells.forces_n([Load(tuple(part.placed(x_m, y_m, 0.0) for part in parts), 1.0)])
-
-
-moving_body = functools.lru_cache(maxsize=32)(MovingBody)
-"""A :class:`MovingBody`, cached; ``parts`` are a tuple."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from contactfpga.design.cover import foams, medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
+from contactfpga.design.cover.hertz import Ball, HalfSpace
 from contactfpga.design.cover.layers import Body, Indentation, Layer, Spring
 from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.point import Switch
@@ -37,6 +38,10 @@ GIVES = 0.75
 
 GRID = 16
 """Sampling points per side of a switch's face for :attr:`Cover.share`."""
+
+
+Indenter = Indentation | HalfSpace
+"""A body on a cover: force, depth and patch."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,11 +155,14 @@ class Cover:
         plate = self.modulus_pa / (1 - medium.POISSON**2)
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
-    def indentation(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Indentation:
-        """A body's parts on this cover, over switches of this pitch. Raises CoverError for the model ``patch``, and for
-        a rigid body without foam."""
+    def indentation(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Indenter:
+        """A body's parts on this cover, over switches of this pitch; with ``point`` a rigid ball as large as the first
+        part on an incompressible half-space. Raises CoverError for the model ``patch``."""
         if self.model == "patch":
             raise CoverError("the model 'patch' knows no force; take 'foam'")
+        if self.model == "point":
+            ball = Ball(parts[0].half_x_m ** 2 / (2 * body.depth_m), self.modulus_pa / 0.75)
+            return HalfSpace(ball, self.thickness_m)
         carries = self.area_m2 / (pitch_x_m * pitch_y_m) if self.cut else 1.0
         layers = self.layers(body, pitch_x_m, pitch_y_m)
         return Indentation(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from contactfpga.design.cover import Body, Cover, Indentation, cells_of
+from contactfpga.design.cover import Body, Cover, Indenter, cells_of
 from contactfpga.design.cover.moving import MovingBody
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, ReadTimeout
@@ -95,7 +95,7 @@ class WornSheet:
         self._load()
 
     @property
-    def indentation(self) -> Indentation:
+    def indentation(self) -> Indenter:
         """The cover between the link and what touches it."""
         return self._moving.indentation
 

@@ -7,7 +7,7 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.design.cover import BODIES, Ball, Cap, Cover, Indentation, elastic
+from contactfpga.design.cover import BODIES, Ball, Cap, Cover, Indenter, elastic
 from contactfpga.design.cover.region import Pressing
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
@@ -19,7 +19,6 @@ from contactfpga_sim.lab.arm.parts import (
     Contacts,
     Control,
     Foam,
-    HalfSpace,
     Motor,
     Run,
     Touch,
@@ -89,7 +88,7 @@ class Case:
         known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
 
-    def spring(self, skin: Skin) -> HalfSpace | Indentation:
+    def spring(self, skin: Skin) -> Indenter:
         """The cover between the arm and what it runs into."""
         if self.model == "point":
             return self.foam.half_space

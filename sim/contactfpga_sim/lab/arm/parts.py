@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 
 from contactfpga.design.cover import Ball, Switch, elastic
 from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
+from contactfpga.design.cover.hertz import HalfSpace
 from contactfpga_sim.apps.latency.usb import HOST_S
 
 BEHAVIORS = ("reverse", "comply")
@@ -127,27 +127,7 @@ class Foam(_Checked):
     def half_space(self) -> HalfSpace:
         """The paper's spring."""
         ball = Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson))
-        return HalfSpace(elastic.stiffness(ball), self.thickness_m, self.base_n_m)
-
-
-@dataclasses.dataclass(frozen=True)
-class HalfSpace:
-    """The paper's spring F = K_s delta^1.5, in which the thickness has no effect until it is pressed flat on a base."""
-
-    stiffness: float
-    """K_s in N/m^1.5."""
-    thickness_m: float
-    base_n_m: float
-
-    def force_n(self, depth_m: float) -> float:
-        """Force at an indentation."""
-        if depth_m <= 0:
-            return 0.0
-        return self.stiffness * depth_m * math.sqrt(depth_m) + self.base_n_m * max(0.0, depth_m - self.thickness_m)
-
-    def depth_m(self, force_n: float) -> float:
-        """Indentation at a force, above the base."""
-        return float((force_n / self.stiffness) ** (2 / 3))
+        return HalfSpace(ball, self.thickness_m, self.base_n_m)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover import BODIES, Indentation, cells_of
-from contactfpga.design.cover.moving import moving_body
+from contactfpga.design.cover import BODIES, Cells, Indentation, Indenter, Load, cells_of
 from contactfpga.skin import Skin
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
 from contactfpga_sim.apps.latency.usb import BridgeChip
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.control import Controller, SensorReadings
+from contactfpga_sim.lab.arm.parts import Touch
 from contactfpga_sim.lab.arm.plant import Plant, finite
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
+
+_LEAST_N, _FINE = 0.01, 1.1
+"""Forces at which shares are computed: the least, and the ratio of successive ones."""
 
 
 class Switches:
@@ -31,8 +35,7 @@ class Switches:
         self._bounce_s, self._period_s = case.switch.bounce_s, case.switch.bounce_period_s
         self._touches = case.touch
         body = BODIES[case.body]
-        parts = (body.ball(case.foam.radius_m),)
-        self._moving = moving_body(case.cover, self._cells.shape, pitches, parts, body)
+        self._indentation = self._cells.indentation([body.ball(case.foam.radius_m)], body)
         self._made = np.zeros((skin.rows, skin.columns), bool)
         self._since = np.full(self._made.shape, -np.inf)
         self._any = False
@@ -44,7 +47,7 @@ class Switches:
         found = np.zeros(self._made.shape)
         for touch, force in zip(self._touches, forces_n):
             if force > 0:
-                found += self._moving.forces_n(touch.x_mm * _MM, touch.y_mm * _MM, force)
+                found += force * self._per_newton(touch, force)
         return found
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
@@ -70,6 +73,24 @@ class Switches:
         half_periods = np.where(bouncing, age, 0.0) // (self._period_s / 2)
         found: np.ndarray = self._made ^ (bouncing & (half_periods % 2 == 1))
         return found
+
+    def _per_newton(self, touch: Touch, force_n: float) -> np.ndarray:
+        """(rows, columns) share of the force on each switch, between forces at which it is computed."""
+        place = max(0.0, math.log(force_n / _LEAST_N) / math.log(_FINE))
+        below = math.floor(place)
+        one, other = (
+            shares(self._cells, self._indentation, touch.x_mm, touch.y_mm, _LEAST_N * _FINE**number)
+            for number in (below, below + 1)
+        )
+        found: np.ndarray = one + (place - below) * (other - one)
+        return found
+
+
+@functools.lru_cache(maxsize=2048)
+def shares(cells: Cells, indentation: Indenter, x_mm: float, y_mm: float, force_n: float) -> np.ndarray:
+    """(rows, columns) share of a force on each switch, at this force."""
+    parts = indentation.parts_at(indentation.depth_m(force_n))
+    return cells.forces_n([Load(tuple(part.placed(x_mm * _MM, y_mm * _MM, 0.0) for part in parts), 1.0)])
 
 
 THRESHOLD_N = 2.0

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Indentation, Load, Part, Rectangle
+from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Indentation, Indenter, Load, Part, Rectangle
 from contactfpga.design.cover.layers import Layer
 
 Value = float | Callable[[float], float]
@@ -171,7 +171,7 @@ def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape
 
 
 @functools.lru_cache(maxsize=4096)
-def _indentation(cover: Cover | None, parts: Shape, body: Body, pitch_x_m: float, pitch_y_m: float) -> Indentation:
+def _indentation(cover: Cover | None, parts: Shape, body: Body, pitch_x_m: float, pitch_y_m: float) -> Indenter:
     if cover is not None:
         return cover.indentation(parts, body, pitch_x_m, pitch_y_m)
     flesh = body.flesh or BODIES["finger"].flesh
@@ -199,7 +199,7 @@ class Approach:
 class PressedDepth:
     """Depth in m of a body under a changing force."""
 
-    indentation: Indentation
+    indentation: Indenter
     force_n: Value
 
     def __call__(self, seconds: float) -> float:
@@ -210,7 +210,7 @@ class PressedDepth:
 class PressedForce:
     """Force of a body at a changing depth, times ``scale``."""
 
-    indentation: Indentation
+    indentation: Indenter
     depth_m: Value
     scale: float
 
@@ -222,7 +222,7 @@ class PressedForce:
 class PressedParts:
     """Parts of a body at a depth, which may change."""
 
-    indentation: Indentation
+    indentation: Indenter
     depth_m: Value
 
     def __call__(self, seconds: float) -> Shape:
