@@ -16,7 +16,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.press import Cover, Load
 
-PLACES = 24
+PLACES = 48
 """Places per pitch in each direction."""
 
 FINE, SHALLOW_M = 1.1, 1e-6
