@@ -15,7 +15,7 @@ from pathlib import Path
 
 from contactfpga.design import kits
 from contactfpga.design.cover import BODIES, cells_of, load_cover
-from contactfpga.design.cover.layers import Layer
+from contactfpga.design.cover.layers import COUPLING, Layer
 from contactfpga_sim.model.board import webassembly
 
 FOLDER = Path(__file__).resolve().parent
@@ -49,9 +49,11 @@ def facts(name: str = KIT) -> dict:
         "parts": cells.parts,
         "thresholds_n": cells.thresholds_n.ravel().tolist(),
         "hysteresis": cover.switch.hysteresis,
-        "layers": [[layer.thickness_m, layer.modulus_pa] for layer in layers if isinstance(layer, Layer)],
+        "layers": [
+            [layer.thickness_m, layer.modulus_pa, layer.coupled] for layer in layers if isinstance(layer, Layer)
+        ],
         "springs": [[layer.stiffness_pa_m, layer.travel_m] for layer in layers if not isinstance(layer, Layer)],
-        "carries": cover.area_m2 / pitch_m**2,
+        "coupling": COUPLING,
         "depth_m": body.depth_m,
         "most_n": MOST_N,
         "clock_hz": skin.clock_hz,

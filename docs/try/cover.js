@@ -5,23 +5,26 @@
 const STEPS = 384; // pressures in the table, from 1e-6 to 1e4 of the softest modulus
 const SHARES = 32; // steps of a patch's pressure from its rim to its middle
 
-// Layers in series by the pressure that they share: how deep a finger comes, and P, the integral of the pressure.
+// Layers in series by the pressure that they share. What couples foam sideways makes small patches stiffer.
 class Layers {
   #depths = [0];
   #pressures = [0];
   #integrals = [0];
+  #couplings = [0];
 
-  constructor({ layers, springs, carries }) {
+  constructor({ layers, springs, coupling }) {
     const softest = Math.min(...layers.map(([, modulus]) => modulus));
     for (let k = 0; k < STEPS; k++) {
       const pressure = softest * 10 ** (-6 + (10 * k) / (STEPS - 1));
       const soft = layers.map(([thickness, modulus]) => (thickness * pressure) / (modulus + pressure));
+      const coupled = layers.map(([thickness, , foam], i) => (foam ? thickness ** 2 * soft[i] : 0));
       const give = springs.map(([stiffness, travel]) => Math.min(pressure / stiffness, travel));
       const depth = [...soft, ...give].reduce((sum, one) => sum + one, 0);
-      const mean = (carries * pressure + this.#pressures[k]) / 2;
+      const mean = (pressure + this.#pressures[k]) / 2;
       this.#integrals.push(this.#integrals[k] + (depth - this.#depths[k]) * mean);
       this.#depths.push(depth);
-      this.#pressures.push(carries * pressure);
+      this.#pressures.push(pressure);
+      this.#couplings.push(coupling * coupled.reduce((sum, one) => sum + one, 0));
     }
   }
 
@@ -29,8 +32,13 @@ class Layers {
     return between(this.#depths, this.#pressures, depth);
   }
 
-  depth(integral) {
-    return between(this.#integrals, this.#depths, integral);
+  // Where a round finger with this force comes that has its radius at the depth `full`; all in m and N.
+  depth(force, radius, full) {
+    const forces = this.#depths.map((depth, k) => {
+      const more = k ? 1 + this.#couplings[k] / (((radius * radius) / full) * depth ** 2) : 1;
+      return ((Math.PI * radius * radius) / full) * this.#integrals[k] * more;
+    });
+    return between(forces, this.#depths, force);
   }
 }
 
@@ -79,7 +87,7 @@ export class Tiles {
   // The patch grows as the root of the depth. Its pressure is that of the depth times 1 - (r / radius)^2.
   #add({ x_mm, y_mm, radius_mm: full_mm, force_n }, forces) {
     const { rows, columns, parts, depth_m } = this.#kit;
-    const depth = this.#layers.depth((force_n * depth_m) / (Math.PI * (full_mm * 1e-3) ** 2));
+    const depth = this.#layers.depth(force_n, full_mm * 1e-3, depth_m);
     const radius_mm = full_mm * Math.sqrt(depth / depth_m);
     const profile = Array.from({ length: SHARES + 1 }, (_, k) => this.#layers.pressure((depth * k) / SHARES));
     const across = this.#span(x_mm, radius_mm, columns);

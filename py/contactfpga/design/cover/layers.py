@@ -8,9 +8,11 @@ With P(d) = int_0^d p, the force is
 
     F = A_round/D P(d) + A_flat p(d).
 
-What couples columns sideways is left out. In a tile of foam it adds less than 10 % to the force for Poisson's ratios up
-to 0.25. Whole foam of the thickness h presses harder by the factor 1 + 0.16 h^2/(a' b') (both: the tests' finite
-elements).
+p is the mean pressure over the surface: layers that carry on a part of it only, such as tiles with gaps between them,
+have their modulus times that part. What couples columns sideways stiffens foam of the thickness h, whole or in tiles,
+by the factor 1 + 0.16 h^2/(a' b'), in a stack by its part of the depth. The force then holds to 10 % for Poisson's
+ratios up to 0.2 in whole foam and up to 0.25 in tiles (the tests' finite elements); under a rigid body that touches few
+tiles this is the mean over its places. The modulus of flesh is what it shows on a hard plate, coupling included.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Ellipse, Pad, Part
 
 COUPLING = 0.16
-"""Share by which whole foam as thick as the patch's radius presses harder than its columns alone."""
+"""Share by which foam as thick as the patch's radius presses harder than its columns alone."""
 
 STEPS = 385
 """Pressures in a table, 6 % apart."""
@@ -45,7 +47,9 @@ class Layer(NamedTuple):
 
     thickness_m: float
     modulus_pa: float
-    """E of small strains."""
+    """E of small strains, times the part of the surface that carries."""
+    coupled: bool = False
+    """Whether its columns couple sideways: foam's do; the modulus of flesh contains that."""
 
     def pressed_m(self, pressure_pa: Floats) -> Floats:
         """Compression under a pressure."""
@@ -56,7 +60,7 @@ class Spring(NamedTuple):
     """Switches that give way in proportion to the force, up to their travel."""
 
     stiffness_pa_m: float
-    """Pressure per travel: a switch's stiffness over the area that rests on it."""
+    """Pressure per travel: a switch's stiffness over the area of the surface that rests on it, gaps included."""
     travel_m: float
 
     def pressed_m(self, pressure_pa: Floats) -> Floats:
@@ -99,27 +103,21 @@ BODIES = {
 class Indentation:
     """Parts of a body on layers in series.
 
-    ``depth_m``: the depth at which the parts have their half axes. ``share``: part of the surface that carries, less
-    the gaps between tiles. ``whole_m``: thickness of foam that is not cut, 0 of tiles. Raises CoverError if nothing is
-    soft.
+    ``depth_m``: the depth at which the parts have their half axes. Raises CoverError if nothing is soft.
     """
 
-    def __init__(
-        self,
-        parts: Sequence[Part],
-        depth_m: float,
-        layers: Sequence[Layer | Spring],
-        share: float = 1.0,
-        whole_m: float = 0.0,
-    ):
+    def __init__(self, parts: Sequence[Part], depth_m: float, layers: Sequence[Layer | Spring]):
         moduli = [layer.modulus_pa for layer in layers if isinstance(layer, Layer)]
         if not moduli:
             raise CoverError("neither body nor cover is soft; give the body flesh or the cover foam")
-        self._parts, self._full_m, self._whole_m = tuple(parts), positive("depth_m", depth_m, "m"), whole_m
+        self._parts, self._full_m = tuple(parts), positive("depth_m", depth_m, "m")
         pressure = np.append(0.0, min(moduli) * np.geomspace(*RANGE, STEPS - 1))
-        self._depth_m: Floats = sum((layer.pressed_m(pressure) for layer in layers), np.zeros(STEPS))
-        self._pressure_pa: Floats = share * pressure
-        means = (self._pressure_pa[1:] + self._pressure_pa[:-1]) / 2
+        self._pressure_pa: Floats = pressure
+        pressed = [(layer, layer.pressed_m(pressure)) for layer in layers]
+        self._depth_m: Floats = sum((each for _, each in pressed), np.zeros(STEPS))
+        foams = ((layer.thickness_m**2, each) for layer, each in pressed if isinstance(layer, Layer) and layer.coupled)
+        self._coupling_m3: Floats = COUPLING * sum((square * each for square, each in foams), np.zeros(STEPS))
+        means = (pressure[1:] + pressure[:-1]) / 2
         self.flat_m = float(sum(layer.pressed_m(np.array(FLAT * min(moduli))) for layer in layers))
         """Depth at which the softest layer is pressed to 4/5."""
         self._integral = np.append(0.0, (np.diff(self._depth_m) * means).cumsum())
@@ -141,8 +139,8 @@ class Indentation:
     def _of(self, part: Part) -> Floats:
         if not isinstance(part, Ellipse):
             return np.asarray(part.area_m2 * self._pressure_pa)
-        coupling = COUPLING * self._whole_m**2 * self._full_m / (part.half_x_m * part.half_y_m)
-        more = np.append(1.0, 1 + coupling / self._depth_m[1:])
+        grown = part.half_x_m * part.half_y_m / self._full_m * self._depth_m[1:] ** 2
+        more = np.append(1.0, 1 + self._coupling_m3[1:] / grown)
         return np.asarray(part.area_m2 / self._full_m * self._integral * more)
 
     def _at(self, part: Part, depth_m: float) -> Part:

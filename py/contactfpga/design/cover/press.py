@@ -163,14 +163,13 @@ class Cover:
         if self.model == "point":
             ball = Ball(parts[0].half_x_m ** 2 / (2 * body.depth_m), self.modulus_pa / 0.75)
             return HalfSpace(ball, self.thickness_m)
-        carries = self.area_m2 / (pitch_x_m * pitch_y_m) if self.cut else 1.0
-        layers = self.layers(body, pitch_x_m, pitch_y_m)
-        return Indentation(parts, body.depth_m, layers, carries, 0.0 if self.cut else self.thickness_m)
+        return Indentation(parts, body.depth_m, self.layers(body, pitch_x_m, pitch_y_m))
 
     def layers(self, body: Body, pitch_x_m: float, pitch_y_m: float) -> list[Layer | Spring]:
-        """Foam, the body's flesh and the switches' travel, of those that there are."""
+        """Foam, the body's flesh and the switches' travel, of those that there are. Tiles carry for the gaps, too."""
         switch, cell = self.switch, pitch_x_m * pitch_y_m
-        found: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa)]
+        carries = self.area_m2 / cell if self.cut else 1.0
+        found: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa * carries, coupled=True)]
         if body.flesh is not None:
             found.append(body.flesh)
         if switch.travel_m:
