@@ -33,7 +33,8 @@ from mcap.records import (
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.driver.mcap import (
+from contactfpga.tools.recordings import Recording, Session, recorder
+from contactfpga.tools.recordings.mcap import (
     FREE,
     KIND,
     LARGEST,
@@ -46,7 +47,6 @@ from contactfpga.driver.mcap import (
     Unreadable,
     parsed,
 )
-from contactfpga.tools.recordings import Recording, Session, recorder
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.recover import recover
 

@@ -3,8 +3,7 @@
 import pytest
 import ros_messages
 
-from contactfpga.driver import mcap
-from contactfpga.tools.recordings import link_recorder, recorder
+from contactfpga.tools.recordings import link_recorder, mcap, recorder
 from contactfpga.zones.units import UnitSamples
 
 NS = 1_700_000_000_123_456_789

@@ -18,9 +18,8 @@ from recorded_stream import NAMES, recorded_both, rewritten
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.driver import mcap
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings import Recording, mcap
 from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile, RecordingFailed
 from contactfpga.tools.recordings.recover import recover
 

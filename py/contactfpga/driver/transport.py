@@ -24,7 +24,7 @@ from contactfpga.skin import Skin
 
 SCHEMES = {
     "sim": "contactfpga_sim.model.board.virtual:board_at",
-    "replay": "contactfpga.driver.recording:ReplayTransport",
+    "replay": "contactfpga.tools.recordings.replay:ReplayTransport",
     "zenoh": "contactfpga.robot.net.port:ZenohPort",
     "flexitac": "contactfpga.driver.flexitac:FlexitacPort",
     "sheet": "contactfpga.driver.sheets:share",

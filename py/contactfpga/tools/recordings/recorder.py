@@ -12,13 +12,13 @@ from collections.abc import Mapping, Set
 from pathlib import Path
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap import MAX_LINKS, MAX_NAME, METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.convert import header
 from contactfpga.robot.ros.feed import offset_ns
 from contactfpga.robot.ros.types import PACKAGE
+from contactfpga.tools.recordings.mcap import MAX_LINKS, MAX_NAME, METADATA, numbered
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Cutter, Hello
 

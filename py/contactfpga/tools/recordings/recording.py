@@ -12,11 +12,11 @@ from pathlib import Path
 from contactfpga import notebook
 from contactfpga.choices.choice import refuse_modules
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap import METADATA, McapBytes, RecordingError
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite
 from contactfpga.skin import Skin
+from contactfpga.tools.recordings.mcap import METADATA, McapBytes, RecordingError
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones

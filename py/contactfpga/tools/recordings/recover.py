@@ -12,7 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver.mcap import (
+from contactfpga.errors import MissingExtra
+from contactfpga.inputs.files import open_regular, replaced, told
+from contactfpga.tools.recordings.mcap import (
     LARGEST,
     MAGIC,
     Cut,
@@ -27,8 +29,6 @@ from contactfpga.driver.mcap import (
     parsed,
     records,
 )
-from contactfpga.errors import MissingExtra
-from contactfpga.inputs.files import open_regular, replaced, told
 from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
 
 

@@ -11,7 +11,6 @@ from types import TracebackType
 
 from contactfpga.driver import driver, forks
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap import SUFFIX
 from contactfpga.driver.subscription import Events
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
@@ -19,6 +18,7 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.robot.ros.feed import Felt
 from contactfpga.skin import Skin
 from contactfpga.tools.recordings.link_recorder import Buffer, LinkMessages, LinkRecorder, Mount
+from contactfpga.tools.recordings.mcap import SUFFIX
 from contactfpga.tools.recordings.mcap_file import RecordingFailed
 from contactfpga.tools.recordings.recorder import Recorder, Split, link_name
 

@@ -11,10 +11,10 @@ from contactfpga.driver import driver
 from contactfpga.driver.address import REPLAY, Replay
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap import MAGIC, SUFFIX, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet
+from contactfpga.tools.recordings.mcap import MAGIC, SUFFIX, files_of
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 

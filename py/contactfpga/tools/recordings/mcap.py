@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
+from contactfpga.driver.address import MAX_LINKS, MAX_NAME
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import shell_words
@@ -173,9 +174,6 @@ METADATA = "contactfpga"
 _BEGIN = struct.Struct("<4xiII")
 _COUNT = struct.Struct("<I")
 
-MAX_LINKS = 64
-MAX_NAME = 256
-"""Most characters of a link's name, which tables repeat in each row."""
 MAX_TEXTS = 1000
 _FOOTER_BYTES = HEAD + 20 + len(MAGIC)
 
