@@ -210,7 +210,7 @@ class PacedTransport(SimTransport):
 
     def __init__(self, name: str, board: SimulatedPort, pace: float):
         super().__init__(name, board)
-        self._pace = Pace(self.clock(), pace, LAG_S)
+        self._pace = Pace(self.clock(), pace, most_lag_s=LAG_S)
 
     def read(self, timeout_s: float) -> bytes:
         """All bytes that are due, of at most :data:`MOMENT_S`, after at most ``timeout_s`` of real or simulated
