@@ -373,4 +373,4 @@ def test_what_is_no_recording(tmp_path, content, said, capsys):
     assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(contactfpga.ContactFPGAError):
-        Recording(path)
+        list(Recording(path).frames())
