@@ -383,23 +383,30 @@ class McapPart:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
-        try:
-            import mcap.records  # noqa: F401
-        except ModuleNotFoundError as error:
-            raise MissingExtra(f"{self.path} ({error})", "record") from None
-        try:
-            file = open_regular(self.path)
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be opened: {error.strerror or told(error)}") from None
-        with file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise RecordingError(f"{self.path} is no MCAP file")
+        with opened(self.path) as file:
             try:
                 yield file
             except (Unreadable, struct.error, OSError) as error:
                 why = str(error if isinstance(error, Unreadable) else Unreadable())
                 recover = shell_words("contactfpga", "record", "--recover", self.path)
                 raise RecordingError(f"{self.path} {why.replace('{recover}', recover)}") from None
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """An MCAP file at its first record. Raises :class:`RecordingError`, :class:`MissingExtra`."""
+    try:
+        import mcap.records  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"{path} ({error})", "record") from None
+    try:
+        file = open_regular(path)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be opened: {error.strerror or told(error)}") from None
+    with file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise RecordingError(f"{path} is no MCAP file")
+        yield file
 
 
 def _apart(file: BinaryIO, places: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
