@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
+from contactfpga.driver.pace import Pace
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.opening import ServedView
 from contactfpga.tools.view.simulated import ALL, KIT, SKINS, SimulatedSource
-from contactfpga.tools.view.sources import SimulatedPace
 from contactfpga_sim.lab.view import browser
 from contactfpga_sim.lab.writer import table_of
 
@@ -33,7 +33,7 @@ WIDTH, HEIGHT, TALL = 1120, 400, 700
 """Pixels; TALL while choosing, lest the panel scroll."""
 
 
-class Asked(SimulatedPace):
+class Asked(Pace):
     """A pace that runs the robots up to a given moment."""
 
     until_s = 0.0
