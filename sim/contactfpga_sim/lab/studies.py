@@ -118,7 +118,7 @@ _ALL = (
         page="kits.md",
         minutes=12,
         sections=tables(
-            "times built pins",
+            "times built",
             kits=Section("tables:headline", page="../README.md"),
             parts=Section("tables:parts_table", sample="tables:parts_table"),
             predictions=Section("tables:predictions_table", sample="tables:predictions_table"),
@@ -268,7 +268,7 @@ _ALL = (
         title="Delay and load of the view in a browser",
         page="view.md",
         minutes=4,
-        sections=tables(view_load=Section("tables:loads_table"), view_clicks=Section("tables:clicks_table")),
+        sections=tables(view_load=Section("tables:loads_table"), view_clicks=Section("tables:clicks_text")),
         compute="tables:compute",
         pictures="tables:draw",
         needs=("chromium",),

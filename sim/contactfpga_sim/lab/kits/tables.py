@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from contactfpga.boards import BOARDS
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
@@ -17,9 +16,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
-from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, placed
-from contactfpga_sim.apps.latency import board as latency
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import Spread
 from contactfpga_sim.apps.latency.stages import Finger
@@ -169,45 +166,6 @@ def built_table(found: list[KitFigures]) -> str:
             )
         )
     return writer.table(("kit", "FPGA", "LUT4", "block RAMs", f"Fmax, slowest of {len(SEEDS)} seeds", "needed"), lines)
-
-
-def pins_table() -> str:
-    """Sheets for an iCEBreaker's 23 pins."""
-    kit = kits.kit("starter").skin
-    cases = {
-        "16x16, rows on registers, columns driven back (the kit)": kit,
-        "the same, pull-ups of 22 kΩ alone": kit.replace(precharge_us=0.0, release_us=4.0),
-        "16x16, rows and columns on registers, 22 kΩ": kit.replace(
-            precharge_us=0.0, release_us=4.0, column_read="74hc165"
-        ),
-        "10x10, each line on a pin, columns driven back": kit.replace(rows=10, columns=10, row_drive="direct"),
-        "10x10, each line on a pin, line reversal": _reversal(kit),
-    }
-    lines = []
-    for name, skin in cases.items():
-        BOARDS["icebreaker"].check(skin)
-        found = latency.measure(skin, touches=49)
-        wires = sum(len(pins) for pins in BOARDS["icebreaker"].pins(skin).values())
-        lines.append(
-            writer.line(
-                (
-                    name,
-                    str(wires),
-                    f"{skin.rows * skin.columns}",
-                    _worst_first(found.touch_to_contact_us, 1),
-                    _worst_first(found.touch_to_last_byte_us, 1),
-                )
-            )
-        )
-    return writer.table(
-        ("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines
-    )
-
-
-def _reversal(skin: Skin) -> Skin:
-    fast = kits.kit("fast").skin
-    times = {name: getattr(fast, name) for name in ("scan", "settle_us", "release_us", "project_us", "send")}
-    return skin.replace(rows=10, columns=10, row_drive="direct", **times)
 
 
 def parts_table() -> writer.Table:
