@@ -288,6 +288,24 @@ def test_a_package_that_is_not_installed_is_told_with_its_extra(toy, monkeypatch
         run(monkeypatch, "toy")
 
 
+def test_studies_together_take_an_hour_but_those_made_apart():
+    assert sum(study.minutes for study in DECLARED if not study.apart) <= 60
+    assert {study.name for study in DECLARED if study.apart} == {"mutants", "sizes"}
+
+
+def test_a_study_that_is_made_apart_may_be_out_of_date_and_is_made_by_its_name(toy, monkeypatch, capsys):
+    with pytest.raises(ContactFPGAError, match=r"^pages are out of date; toy\.md: toy: make pages NAME=toy; toy\.md: "):
+        run(monkeypatch, "--check")
+    apart = dataclasses.replace(studies.STUDIES["toy"], apart=True, minutes=1e-9)
+    monkeypatch.setattr(studies, "STUDIES", {"toy": apart})
+    assert run(monkeypatch, "--check") == 0
+    assert run(monkeypatch, "--all") == 0
+    assert "old" in toy.read_text()
+    assert run(monkeypatch, "toy") == 0
+    assert "old" not in toy.read_text()
+    assert "; its limit on two cores is 1e-09" in capsys.readouterr().err
+
+
 def test_all_studies_are_listed_without_what_they_need(monkeypatch, capsys):
     assert run(monkeypatch, "--list") == 0
     lines = capsys.readouterr().out.splitlines()

@@ -46,7 +46,7 @@ class Study:
     page: str
     """Page in ``docs``."""
     minutes: float
-    """Minutes on two cores without cached results."""
+    """Limit of its minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
     """Sections by marker, in order of making."""
     compute: str = ""
@@ -57,6 +57,8 @@ class Study:
     """Extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
     """Needed programs, and paths with a slash."""
+    apart: bool = False
+    """Whether it takes so long that only its name makes it, and a release may have it out of date."""
     package: str = "contactfpga_sim.lab"
     """Package of its folder."""
 

@@ -150,6 +150,7 @@ _ALL = (
         title="Mutants of the netlist that the comparison with the golden model tells",
         page="mutants.md",
         minutes=150,
+        apart=True,
         sections=tables("mutants options several"),
         compute="tables:compute",
     ),
@@ -230,6 +231,7 @@ _ALL = (
         title="Size and clock by place and route",
         page="performance.md",
         minutes=60,
+        apart=True,
         sections=tables(
             gateware=Section("tables:gateware_table", of_netlists=True),
             faults=Section("tables:faults_table", of_netlists=True),

@@ -30,6 +30,8 @@ PIECE = 100
 TIMED = 200
 """Placements timed as touches."""
 
+BAD = 0.1
+
 DEVICE = sizes.UP5K
 
 
@@ -75,20 +77,20 @@ def study(
     Results are cached by code. ``executor`` can be Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
+    parts: dict[Task, tuple[Future[list[Found]], list[Future[Raw]]]] = {
         task: (
-            [executor.submit(accuracy, task, first) for first in range(0, task.count, PIECE)],
+            executor.submit(accuracies, task),
             [executor.submit(timing, task, first) for first in range(0, min(TIMED, task.count), PIECE)],
         )
         for task in dict.fromkeys(tasks)
     }
     places = {skin: executor.submit(_size, skin) for skin in skins}
     names: dict[Future[Any], str] = {
-        **dict.fromkeys((piece for pieces, _ in parts.values() for piece in pieces), "placements"),
+        **dict.fromkeys((pieces for pieces, _ in parts.values()), "placements"),
         **dict.fromkeys((piece for _, timed in parts.values() for piece in timed), "times"),
         **dict.fromkeys(places.values(), "place and route"),
     }
-    owners = {future: task for task, (pieces, timed) in parts.items() for future in (*pieces, *timed)}
+    owners = {future: task for task, (pieces, timed) in parts.items() for future in (pieces, *timed)}
     found = {} if so_far is None else so_far
     of = Counter(names.values())
     for future in as_completed(names):
@@ -98,8 +100,8 @@ def study(
         if task is None:
             continue
         pieces, timed = parts[task]
-        if all(piece.done() for piece in pieces) and all(piece.done() for piece in timed):
-            measured = intervals([piece.result() for piece in pieces])
+        if pieces.done() and all(piece.done() for piece in timed):
+            measured = intervals(pieces.result())
             passed = times.summed([piece.result() for piece in timed], task.skin)
             found[task] = Point(task, measured, passed, None, None)
     return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
@@ -114,6 +116,18 @@ def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
         kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
+
+
+def accuracies(task: Task) -> list[Found]:
+    """Errors of pieces of the scenes, until it is clear that more than :data:`BAD` of all are miscounted: then no more
+    digit of the share matters."""
+    found: list[Found] = []
+    for first in range(0, task.count, PIECE):
+        found.append(accuracy(task, first))
+        wrong = [value for piece in found for value in piece["total"]["miscounted"]]
+        if stats.interval(wrong).low > BAD:
+            break
+    return found
 
 
 def accuracy(task: Task, first: int) -> Found:
@@ -185,10 +199,18 @@ def covered(task: Task) -> bool:
     return not times.at_once(task.cover)
 
 
+def in_all(points: Sequence[Point]) -> list[str]:
+    """Methods with a point in every family of these."""
+    families = {point.task.family for point in points}
+    counts = Counter(point.task.method for point in points)
+    return [method for method, count in counts.items() if count == len(families)]
+
+
 def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the least mean share of miscounted scenes; the first of equals."""
+    """The covered method with the least mean share of miscounted scenes of all families; the first of equals."""
     shares: dict[str, list[float]] = {}
+    methods = in_all(points)
     for point in points:
-        if covered(point.task):
+        if covered(point.task) and point.task.method in methods:
             shares.setdefault(point.task.method, []).append(point.errors["total"]["miscounted"].mean)
     return min(shares, key=lambda method: float(np.mean(shares[method])), default="")

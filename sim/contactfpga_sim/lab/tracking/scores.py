@@ -306,7 +306,7 @@ class _Linker:
         return self._fresh - 1
 
 
-RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
+RATES_HZ = (25.0, 100.0, 10_000.0)
 
 JUDGED_RATES = RATES_HZ[1:]
 """Rates at which the tracker must not be worse."""
