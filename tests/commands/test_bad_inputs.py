@@ -16,7 +16,7 @@ from wire import Wire
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import pool
+from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.arm import report
 from contactfpga_sim.model.board import native
 

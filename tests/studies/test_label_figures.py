@@ -7,12 +7,11 @@ import pytest
 from sample import sample
 from study_pages import section
 
-from contactfpga.skin import Skin
 from contactfpga_sim.lab.performance import labellers as label_figures
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
-SQUARE = Skin(settle_us=15.0)
+SQUARE = label_figures.SHEET
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,12 @@
-"""Clocks of the labeller's last record from a frame's last row, for touches, recordings, and shapes that break
-labellers."""
+"""Clocks of the labeller's last record from a frame's last row, for touches and for shapes that break labellers."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
@@ -19,6 +15,8 @@ from contactfpga_sim.model.scenes.shapes import variants
 from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
+
+SHEET = Skin(settle_us=15.0)
 
 TOUCHES = 400
 """Random scenes of each family."""
@@ -29,42 +27,18 @@ SEED = 20
 def labeller_table() -> str:
     place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
     lines = []
-    for size in (16, 32, 64):
-        places = every_place(touches(Skin(rows=size, columns=size, settle_us=15.0)))
-        for labeller in EXACT:
-            for connectivity in (8, 4):
-                skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
-                lines.append(labeller_row(skin, places))
-    head = ("labeller", "cells", "connectivity", place, worst, "bound")
-    return writer.table(head, sorted(lines, key=lambda line: line.split("|")[1]))
+    places = every_place(touches(SHEET))
+    for labeller in EXACT:
+        for connectivity in (8, 4):
+            lines.append(labeller_row(SHEET.replace(labeller=labeller, connectivity=connectivity), places))
+    return writer.table(("labeller", "connectivity", place, worst, "bound"), lines)
 
 
 def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
     worst = worst_last_record_clocks(skin)
     found = f"{spread(*places, skin.connectivity, skin.labeller)} clocks"
     most = str(bound(skin.columns, skin.connectivity, skin.labeller))
-    sheet = f"{skin.rows}x{skin.columns}"
-    return writer.line((f"`{skin.labeller}`", sheet, str(skin.connectivity), found, f"{worst} clocks", most))
-
-
-def recordings_table() -> str:
-    return recorded_table(scans.recordings())
-
-
-def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
-    """Latency over (n, R, C) bool frames, as if the sheet ended after any row."""
-    lines = []
-    for name, frames in recordings.items():
-        _, rows, columns = frames.shape
-        places = counted(last_rows(frames), columns)
-        for connectivity in (8, 4):
-            found = (
-                f"{spread(*places, connectivity, labeller)}, {bound(columns, connectivity, labeller)}"
-                for labeller in EXACT
-            )
-            lines.append(writer.line((name, f"{rows}x{columns}", str(connectivity), *found)))
-    spreads = (f"`{labeller.name}`: median / 99 % / worst, bound" for labeller in EXACT)
-    return writer.table(("recording", "sheet", "connectivity", *spreads), lines)
+    return writer.line((f"`{skin.labeller}`", str(skin.connectivity), found, f"{worst} clocks", most))
 
 
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
@@ -125,5 +99,4 @@ def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: Lab
 
 
 def labeller_sample() -> str:
-    skin = Skin(labeller="run", settle_us=15.0)
-    return labeller_row(skin, every_place(touches(skin)))
+    return labeller_row(SHEET, every_place(touches(SHEET)))

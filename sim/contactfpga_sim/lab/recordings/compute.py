@@ -19,7 +19,6 @@ import numpy as np
 import contactfpga
 from contactfpga.skin import Skin
 from contactfpga.tools.recordings import Recording, Session
-from contactfpga.tools.recordings.export import export
 from contactfpga.tools.recordings.link_recorder import LinkRecorder
 from contactfpga.tools.recordings.recover import recover
 from contactfpga_sim.model.board.virtual import VirtualBoard
@@ -76,26 +75,6 @@ def cost(source: Path, seconds: float, into: Path, bytes_only: bool) -> Cost:
             session.wait(1.0)
     cpu_s = time.process_time() - before
     return Cost(session.frames / seconds, session.size / session.frames, session.frames / cpu_s)
-
-
-@dataclasses.dataclass(frozen=True)
-class Reading:
-    """Frames per CPU second."""
-
-    frames: float
-    rows: float
-    """Rows of a table, with tracks."""
-    parquet_bytes: float
-
-
-def reading(path: Path, into: Path) -> Reading:
-    """Read and export a recording."""
-    recording = Recording(path)
-    before = time.process_time()
-    count = sum(1 for _ in recording.frames())
-    read_s, before = time.process_time() - before, time.process_time()
-    rows = export(recording, into)
-    return Reading(count / read_s, rows / (time.process_time() - before), into.stat().st_size / rows)
 
 
 @dataclasses.dataclass(frozen=True)

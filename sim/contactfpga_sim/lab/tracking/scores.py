@@ -19,7 +19,7 @@ from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab import kept, pool
+from contactfpga_sim.apps import kept, pool
 from contactfpga_sim.lab.tracking import scenes
 from contactfpga_sim.lab.tracking.scenes import FrameTruth, Place, zones_of
 from contactfpga_sim.model.scenes.recordings import Recording
@@ -306,7 +306,7 @@ class _Linker:
         return self._fresh - 1
 
 
-RATES_HZ = (25.0, 100.0, 1000.0, 10_000.0)
+RATES_HZ = (25.0, 100.0, 10_000.0)
 
 JUDGED_RATES = RATES_HZ[1:]
 """Rates at which the tracker must not be worse."""
