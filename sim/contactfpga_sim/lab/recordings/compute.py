@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
+from contactfpga.recordings import Recording, Session
 from contactfpga.skin import Skin
-from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.recordings.export import export
 from contactfpga.tools.recordings.link_recorder import LinkRecorder
 from contactfpga.tools.recordings.recover import recover
