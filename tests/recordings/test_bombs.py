@@ -33,7 +33,7 @@ from mcap.records import (
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.tools.recordings import Recording, Session
+from contactfpga.recordings import Recording, Session
 from contactfpga.tools.recordings.mcap import (
     FREE,
     KIND,

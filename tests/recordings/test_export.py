@@ -12,8 +12,8 @@ from recorded_stream import StreamPort, recorded, written
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.export import COLUMNS, pieces
 from contactfpga.wire.protocol import Frame, no_records
 

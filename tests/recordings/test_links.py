@@ -10,9 +10,10 @@ from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.body import Body
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, Session, link_recorder
+from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.recordings.recover import recover
 from contactfpga.wire.hello import Cutter
 

@@ -7,9 +7,9 @@ from wire import old_frame, old_hello
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.ros.feed import offset_ns
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, Session
 
 SKIN = Skin()
 LONG = 60.0

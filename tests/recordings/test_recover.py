@@ -18,8 +18,9 @@ from recorded_stream import NAMES, recorded_both, rewritten
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, mcap
+from contactfpga.tools.recordings import mcap
 from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
 from contactfpga.tools.recordings.recover import recover
 

@@ -13,7 +13,8 @@ from recorded_stream import replayed
 
 import contactfpga
 from contactfpga.driver.conversation import Conversation
-from contactfpga.tools.recordings import Session, link_recorder
+from contactfpga.recordings import Session
+from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.recordings.link_recorder import LinkMessages
 
 

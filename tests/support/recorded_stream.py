@@ -10,7 +10,7 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.tools.recordings import Session
+from contactfpga.recordings import Session
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.messages import BYTES, of_bytes
 

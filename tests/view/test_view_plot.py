@@ -52,13 +52,15 @@ def test_where_and_for_how_long(monkeypatch):
     assert found.lost.sum() == 0
 
 
-def test_a_piece_that_came_late_shows():
-    frames = [
-        (seconds + (0.004 if 20 <= number < 30 else 0), zones)
-        for number, (seconds, zones) in enumerate(recorded(50, lambda _: []))
-    ]
+@pytest.mark.parametrize("chunk", [3, 2000])
+def test_a_piece_that_came_late_shows(monkeypatch, chunk):
+    """The first piece has five frames, of which only the last one's moment is known."""
+    monkeypatch.setattr("contactfpga.tools.view.plot.CHUNK", chunk)
+    frames = [(max(0.0, seconds - 0.004), zones) for seconds, zones in recorded(50, lambda _: [])]
+    frames[20:30] = [(seconds + 0.002, zones) for seconds, zones in frames[20:30]]
     late = np.array(Touches.of(Recording(frames)).late)
-    np.testing.assert_allclose(late, [(0, 0), (0.024, 0.004), (0.03, 0)], atol=1e-9)
+    assert late[:, 1].tolist() == pytest.approx([-0.004, -0.002, -0.004])
+    np.testing.assert_allclose(late[:, 0], [0, 0.018, 0.026], atol=0.0011)
 
 
 def test_a_barycenter_over_the_seam_lies_in_the_nearer_column():

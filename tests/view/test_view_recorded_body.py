@@ -10,9 +10,10 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 
 pytest.importorskip("viser")
 
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.body import Body, BodyError, packed
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.tools.recordings import Recording, Session, link_recorder
+from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.bodies import BodyPlayer, pushes
 from contactfpga.tools.view.playback import Player

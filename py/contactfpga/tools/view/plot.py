@@ -124,7 +124,7 @@ class Touches:
         """Time of a barycenter in each cell; with ``report = "cells"``, time for which each cell was pressed."""
         self.lost = np.zeros(steps, int)
         self.late: list[tuple[float, float]] = []
-        """Times of the first frame of each piece of bytes, and by how much the host's clock is ahead of the board's."""
+        """Time of a frame of each piece of bytes, and by how much the host's clock is then ahead of the board's."""
         self._before: Zones | None = None
         self._before_s = 0.0
 
@@ -149,9 +149,11 @@ class Touches:
         if self._before is not None:
             self._hold(self._before, self._before_s, times_s[0])
             self.lost[steps[0]] += (int(sequences[0]) - self._before.sequence - 1) % 256
-        late_s = times_s - batch.frames["time_us"] / 1e6
-        for number in np.flatnonzero(np.abs(np.diff(late_s, prepend=self.late[-1][1] if self.late else np.inf)) > 1e-9):
-            self.late.append((times_s[number], late_s[number]))
+        # Only the last of several frames with one time has it exactly, as times are never below 0 and never fall.
+        known = np.flatnonzero(np.diff(times_s) > 0)
+        late_s = times_s[known] - batch.frames["time_us"][known] / 1e6
+        changed = np.abs(np.diff(late_s, prepend=self.late[-1][1] if self.late else np.inf)) > 1e-9
+        self.late += zip(times_s[known][changed], late_s[changed], strict=True)
         np.add.at(self.lost, steps[1:], (np.diff(sequences) - 1) % 256)
         self.frames += len(chunk)
         np.maximum.at(self.zones, steps, batch.frames["total_zones"])

@@ -11,7 +11,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.tools.recordings import Recording
+    from contactfpga.tools.recordings.recording import Recording
 
 Reading = Callable[[int, int], object]
 """Receives the number of bytes read of a file, and its size."""
@@ -50,7 +50,7 @@ def load(name: str, link: str | None = None, reading: Reading = silent) -> Board
     Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file without
     ``[record]``.
     """
-    from contactfpga.tools.recordings import Recording
+    from contactfpga.tools.recordings.recording import Recording
 
     asked = Replay.parse(name if name.startswith(REPLAY) else f"{REPLAY}{name}")
     link = link or asked.link

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
+from contactfpga.recordings import Recording, Session
 from contactfpga.skin import Skin
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.recordings.link_recorder import LinkRecorder
