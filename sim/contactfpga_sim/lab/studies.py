@@ -170,7 +170,6 @@ _ALL = (
         minutes=3,
         sections=tables(
             reference=Section("scans:reference_table", sample="scans:reference_sample"),
-            labeller=Section("labellers:labeller_table", sample="labellers:labeller_sample"),
             report=Section("scans:report_table", sample="scans:report_sample"),
             fast=Section("scans:latency_table", sample="scans:latency_sample"),
             bridges=Section("bridges:bridge_table", page="boards.md", sample="bridges:bridge_sample"),
