@@ -28,9 +28,12 @@ FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 PIECE = 100
 
 TIMED = 200
-"""Placements timed as touches."""
+"""Most placements timed as touches."""
 
 BAD = 0.1
+
+NARROW = 0.15
+"""Half of the median's interval over the median at which touches are enough."""
 
 DEVICE = sizes.UP5K
 
@@ -77,20 +80,20 @@ def study(
     Results are cached by code. ``executor`` can be Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    parts: dict[Task, tuple[Future[list[Found]], list[Future[Raw]]]] = {
+    parts: dict[Task, tuple[Future[list[Found]], Future[list[Raw]]]] = {
         task: (
             executor.submit(accuracies, task),
-            [executor.submit(timing, task, first) for first in range(0, min(TIMED, task.count), PIECE)],
+            executor.submit(timings, task),
         )
         for task in dict.fromkeys(tasks)
     }
     places = {skin: executor.submit(_size, skin) for skin in skins}
     names: dict[Future[Any], str] = {
         **dict.fromkeys((pieces for pieces, _ in parts.values()), "placements"),
-        **dict.fromkeys((piece for _, timed in parts.values() for piece in timed), "times"),
+        **dict.fromkeys((timed for _, timed in parts.values()), "times"),
         **dict.fromkeys(places.values(), "place and route"),
     }
-    owners = {future: task for task, (pieces, timed) in parts.items() for future in (pieces, *timed)}
+    owners = {future: task for task, (pieces, timed) in parts.items() for future in (pieces, timed)}
     found = {} if so_far is None else so_far
     of = Counter(names.values())
     for future in as_completed(names):
@@ -100,9 +103,9 @@ def study(
         if task is None:
             continue
         pieces, timed = parts[task]
-        if pieces.done() and all(piece.done() for piece in timed):
+        if pieces.done() and timed.done():
             measured = intervals(pieces.result())
-            passed = times.summed([piece.result() for piece in timed], task.skin)
+            passed = times.summed(timed.result(), task.skin)
             found[task] = Point(task, measured, passed, None, None)
     return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
 
@@ -138,6 +141,17 @@ def accuracy(task: Task, first: int) -> Found:
         return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
+
+
+def timings(task: Task) -> list[Raw]:
+    """Times of pieces of the touches, until the interval of the median is narrow."""
+    found: list[Raw] = []
+    for first in range(0, min(TIMED, task.count), PIECE):
+        found.append(timing(task, first))
+        median = stats.quantile([value for piece in found for value in piece["touch"]], 0.5)
+        if median.high - median.low <= 2 * NARROW * median.value:
+            break
+    return found
 
 
 def timing(task: Task, first: int) -> Raw:

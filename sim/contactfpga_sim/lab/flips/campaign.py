@@ -39,7 +39,7 @@ def luts(design: str) -> int:
 
 BLOCK = 25
 
-MOST = 200
+MOST = 150
 """Flips of registers, or of memories, of a design."""
 
 NARROW = 0.02

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 from contactfpga import picture_style as style
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
+from contactfpga_sim.apps import pool
 from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.failures import tables
 from contactfpga_sim.lab.haptics import breaks, coverage, felt
@@ -85,7 +87,8 @@ APART_MM = (30.0, 60.0, 100.0)
 @functools.cache
 def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
     """(contacts, times) errors in m by method."""
-    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
+    with pool.executor() as workers:
+        each = list(workers.map(felt.errors, itertools.repeat(setting), range(count), itertools.repeat(times_s)))
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import csv
+import functools
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,7 @@ from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
 from contactfpga_hdl.board import build, placed
+from contactfpga_sim.apps import pool
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import Spread
 from contactfpga_sim.apps.latency.stages import Finger
@@ -52,9 +54,13 @@ def compute() -> list[KitFigures]:
 def _figures(kit: Kit) -> KitFigures:
     settings = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
     finger = stages.measure(kit.skin, settings, host_touches=0)
+    with pool.executor() as workers:
+        return KitFigures(kit, finger, tuple(workers.map(functools.partial(_built, kit), SEEDS)))
+
+
+def _built(kit: Kit, seed: int) -> placed.Report:
     with tempfile.TemporaryDirectory() as folder:
-        reports = tuple(build.build(kit.skin, kit.board, Path(folder), seed) for seed in SEEDS)
-    return KitFigures(kit, finger, reports)
+        return build.build(kit.skin, kit.board, Path(folder), seed)
 
 
 def _worst_first(us: Spread, digits: int = 0) -> str:

@@ -19,7 +19,6 @@ import numpy as np
 import contactfpga
 from contactfpga.recordings import Recording, Session
 from contactfpga.skin import Skin
-from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.recordings.link_recorder import LinkRecorder
 from contactfpga.tools.recordings.recover import recover
 from contactfpga_sim.model.board.virtual import VirtualBoard
