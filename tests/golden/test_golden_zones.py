@@ -173,7 +173,7 @@ def test_zones_around_a_cylinder_are_those_of_an_unrolled_sheet(connectivity, co
         assert sorted(map(tuple, of_many)) == sorted(records)
 
 
-@pytest.mark.parametrize("labeller", [labeller for labeller in LABELLERS.values() if labeller.exact], ids=str)
+@pytest.mark.parametrize("labeller", [one for one in LABELLERS.values() if one.exact], ids=lambda one: one.name)
 @pytest.mark.parametrize("connectivity", [8, 4])
 def test_the_last_two_rows_alone_decide_how_late_the_last_record_is(labeller, connectivity):
     rng = np.random.default_rng(3)
