@@ -24,7 +24,7 @@ _ALL = (
         "body",
         title="A robot of several sheets",
         page="body.md",
-        minutes=1.5,
+        minutes=1,
         sections=tables("outages registration", folds=Section("tables:folds_table", sample="tables:folds_sample")),
         extra="test",
     ),
@@ -60,7 +60,7 @@ _ALL = (
         "cover",
         title="Formulas for covers of foam against integrals and the paper",
         page="cover.md",
-        minutes=2,
+        minutes=1.5,
         sections=tables(
             "sense",
             closes=Section("caps:felt_table", sample="caps:felt_sample"),
@@ -103,7 +103,7 @@ _ALL = (
         "haptics",
         title="Places and forces by pressure units",
         page="haptics.md",
-        minutes=4,
+        minutes=6,
         sections=tables(
             "places wrong pairs",
             layouts=Section("tables:layouts_table", sample="tables:layouts_table"),
@@ -130,7 +130,7 @@ _ALL = (
         "maker",
         title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
-        minutes=0.5,
+        minutes=0.3,
         sections=tables(
             diodes=Section("tables:diodes_table", sample="tables:diodes_table"),
             pulls=Section("tables:pulls_table", sample="tables:pulls_table"),
@@ -141,7 +141,7 @@ _ALL = (
         "mujoco",
         title="An arm with and without skin, and a sheet beside a momentum observer",
         page="mujoco.md",
-        minutes=1,
+        minutes=0.5,
         sections=tables(peaks=Section("clip:peaks_table")),
         extra="test",
     ),
@@ -218,7 +218,7 @@ _ALL = (
         "several",
         title="Cost of several sheets at one FPGA",
         page="several.md",
-        minutes=1,
+        minutes=0.7,
         sections=tables(
             several_line=Section("tables:line_table", sample="tables:line_sample"),
             several_size=Section("tables:size_table", of_netlists=True),
