@@ -127,7 +127,7 @@ CASES = [
     *(["record", "--recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
     ["record", "--recover", "RECORDED", "--seconds", "1"],
     ["record", "--recover", "RECORDED", "--bytes-only"],
-    *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "NO_HELLO")),
     *(["record", name, "sim://"] for name in ("x.bin", "/no/folder/x.mcap", "x")),
     *(["record", "x.mcap", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     ["record", "x.mcap", "replay://NONE"],

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from study_pages import section
+from study_pages import cells, section
 
 from contactfpga.design.cover import Ball, Cap, Cover
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M
@@ -13,10 +13,6 @@ from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
 RUN = StudyRun(STUDIES["cover"])
-
-
-def cells(table):
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 
 def test_errors_of_the_models_are_up_to_date():

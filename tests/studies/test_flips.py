@@ -243,10 +243,6 @@ def test_numbers_are_read_back_as_they_were_written(tmp_path):
     assert summary.wrong_ms(rows) == (250.0, 250.0)
 
 
-def test_a_block_after_one_that_is_missing_does_not_count():
-    assert list(campaign._first([[1], [2, 3], None, [4]])) == [1, 2, 3]
-
-
 def test_the_page_says_what_the_numbers_beside_it_say():
     rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
     assert [design.name for design in sizes] == list(DESIGNS)

@@ -2,6 +2,7 @@
 found out of date."""
 
 import csv
+import dataclasses
 import functools
 import inspect
 import re
@@ -188,24 +189,28 @@ def draw(folder, found):
 """
 
 
+TOYS = {"toy": Section("tables:table"), "fixed": Section("tables:fixed")}
+
+
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
     """A project of one page and one study."""
     (tmp_path / "docs").mkdir()
     page = tmp_path / "docs" / "toy.md"
     page.write_text("a\n<!-- figures: toy -->\nold\n<!-- end -->\n<!-- figures: fixed of 1234 -->\nb\n<!-- end -->\n")
-    (tmp_path / "toys").mkdir()
-    (tmp_path / "toys" / "made_toy.py").write_text(MAKES)
-    sections = {"toy": Section("toys/made_toy.py:table"), "fixed": Section("toys/made_toy.py:fixed")}
-    places = {"compute": "toys/made_toy.py:compute", "pictures": "toys/made_toy.py:draw"}
-    declared = Study("toy", title="Toys", page="toy.md", minutes=1, sections=sections, **places)
+    (tmp_path / "toys" / "toy").mkdir(parents=True)
+    for file, text in (("__init__", ""), ("toy/__init__", ""), ("toy/tables", MAKES)):
+        (tmp_path / "toys" / f"{file}.py").write_text(text)
+    places = {"compute": "tables:compute", "pictures": "tables:draw", "package": "toys"}
+    declared = Study("toy", title="Toys", page="toy.md", minutes=1, sections=TOYS, **places)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(studies, "STUDIES", {"toy": declared})
-    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.syspath_prepend(tmp_path)
     meaning._of.cache_clear()
     meaning._marks.cache_clear()
     yield page
-    sys.modules.pop("made_toy", None)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toys"]:
+        del sys.modules[name]
 
 
 def run(monkeypatch, *arguments):
@@ -235,14 +240,14 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     run(monkeypatch, "--all")
     capsys.readouterr()
     assert stale() == []
-    code = Path("toys/made_toy.py")
+    code = Path("toys/toy/tables.py")
     code.write_text(
         '"""Explained."""\nimport os\n# and more\n' + MAKES.replace("    return [1", '    "It."\n    return  [1')
     )
     assert stale() == []
     moved = MAKES.partition("def fixed")
-    code.write_text("from beside_toy import fixed, draw\n" + moved[0])
-    Path("toys/beside_toy.py").write_text("".join(moved[1:]))
+    code.write_text("from toys.toy.beside import fixed, draw\n" + moved[0])
+    Path("toys/toy/beside.py").write_text("".join(moved[1:]))
     assert stale() == []
     code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
     assert len(stale()) == 2
@@ -269,8 +274,8 @@ def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, ca
         run(monkeypatch, "toy")
     assert run(monkeypatch, "--all") == 0
     assert capsys.readouterr().err == "left out: toy needs no-such-program, no/such/folder\n"
-    without = {"toy": Section("toys/made_toy.py:table", needs=("no/such/folder",))}
-    part = Study("toy", title="T", page="toy.md", minutes=1, sections=without, compute=whole.compute)
+    without = {"toy": dataclasses.replace(TOYS["toy"], needs=("no/such/folder",))}
+    part = dataclasses.replace(whole, sections=without, pictures="")
     monkeypatch.setattr(studies, "STUDIES", {"toy": part})
     assert run(monkeypatch, "toy") == 0
     assert capsys.readouterr().out == "toy.md: toy stays as it is without no/such/folder\n"
@@ -278,9 +283,27 @@ def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, ca
 
 
 def test_a_package_that_is_not_installed_is_told_with_its_extra(toy, monkeypatch):
-    Path("toys/made_toy.py").write_text("import no_such_package_of_anybody")
+    Path("toys/toy/tables.py").write_text("import no_such_package_of_anybody")
     with pytest.raises(MissingExtra, match=r"^toy needs more than is installed; .*\[sim\]'"):
         run(monkeypatch, "toy")
+
+
+def test_studies_together_take_an_hour_but_those_made_apart():
+    assert sum(study.minutes for study in DECLARED if not study.apart) <= 60
+    assert {study.name for study in DECLARED if study.apart} == {"mutants", "sizes"}
+
+
+def test_a_study_that_is_made_apart_may_be_out_of_date_and_is_made_by_its_name(toy, monkeypatch, capsys):
+    with pytest.raises(ContactFPGAError, match=r"^pages are out of date; toy\.md: toy: make pages NAME=toy; toy\.md: "):
+        run(monkeypatch, "--check")
+    apart = dataclasses.replace(studies.STUDIES["toy"], apart=True, minutes=1e-9)
+    monkeypatch.setattr(studies, "STUDIES", {"toy": apart})
+    assert run(monkeypatch, "--check") == 0
+    assert run(monkeypatch, "--all") == 0
+    assert "old" in toy.read_text()
+    assert run(monkeypatch, "toy") == 0
+    assert "old" not in toy.read_text()
+    assert "; its limit on two cores is 1e-09" in capsys.readouterr().err
 
 
 def test_all_studies_are_listed_without_what_they_need(monkeypatch, capsys):

@@ -14,6 +14,10 @@ def section(page, name):
     return writer.whole(DOCS / page, name)
 
 
+def cells(table):
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+
+
 def outdated(study, computed, *names):
     """Sections of a study, of these names or all, that it would make otherwise of these results."""
     run = StudyRun(STUDIES[study])

@@ -39,9 +39,7 @@ def _file(module: str) -> Path:
 
 @functools.cache
 def _of(modules: frozenset[str]) -> str:
-    scripts = [Path(module).resolve() for module in modules if "/" in module]
-    named = [module for module in modules if "/" not in module]
-    marks = {mark for file in sources.files(named, scripts) for mark in _marks(file)}
+    marks = {mark for file in sources.files(modules) for mark in _marks(file)}
     return _hashed("\n".join(sorted(marks)))
 
 

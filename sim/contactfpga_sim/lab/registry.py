@@ -1,7 +1,6 @@
-"""Entries of studies, in ``studies.py``; a study's folder is beside this file, unless scripts make all of it.
+"""Entries of studies, in ``studies.py``; a study's folder is beside this file.
 
-An entry names functions as ``module:function`` of its folder, or ``folder/file.py:function`` of the project's, so that
-reading it imports nothing.
+An entry names functions as ``module:function`` of its folder, so that reading it imports nothing.
 """
 
 from __future__ import annotations
@@ -10,9 +9,7 @@ import dataclasses
 import functools
 import importlib
 import inspect
-import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from contactfpga_sim.lab import writer
@@ -49,7 +46,7 @@ class Study:
     page: str
     """Page in ``docs``."""
     minutes: float
-    """Minutes on two cores without cached results."""
+    """Limit of its minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
     """Sections by marker, in order of making."""
     compute: str = ""
@@ -60,23 +57,20 @@ class Study:
     """Extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
     """Needed programs, and paths with a slash."""
+    apart: bool = False
+    """Whether it takes so long that only its name makes it, and a release may have it out of date."""
+    package: str = "contactfpga_sim.lab"
+    """Package of its folder."""
 
     def page_of(self, section: str) -> str:
         return self.sections[section].page or self.page
 
     def module(self, place: str) -> str:
-        """Module of a function, or its file."""
-        module = place.partition(":")[0]
-        return module if "/" in module else f"{__package__}.{self.name}.{module}"
+        """Module of a function."""
+        return f"{self.package}.{self.name}.{place.partition(':')[0]}"
 
     def function(self, place: str) -> Callable[..., Any]:
-        module, name = self.module(place), place.partition(":")[2]
-        if "/" in module:
-            file = Path(module).resolve()
-            if str(file.parent) not in sys.path:
-                sys.path.append(str(file.parent))
-            module = file.stem
-        found: Callable[..., Any] = getattr(importlib.import_module(module), name)
+        found: Callable[..., Any] = getattr(importlib.import_module(self.module(place)), place.partition(":")[2])
         return found
 
 

@@ -49,15 +49,19 @@ def by(labeller: Labeller) -> dict[str, Method]:
     return found
 
 
-def _methods() -> dict[str, Method]:
-    methods = by(LABELLERS["run"])
+def _covers() -> dict[str, Method]:
+    methods: dict[str, Method] = {}
     for pitch in (PITCH_MM, 10.0):
         for cover in ("caps", "paper", "bare"):
             methods |= under(cover, "run", pitch)
     for force in THRESHOLDS_N:
         switch = dataclasses.replace(DOME, force_n=force)
         methods[f"run, {PITCH_MM:g} mm, tiles, {force:g} N"] = Method(sheet(PITCH_MM), tiled(PITCH_MM, switch))
-    return methods | _settings() | _reversal()
+    return methods
+
+
+def _methods() -> dict[str, Method]:
+    return by(LABELLERS["run"]) | _covers() | _settings() | _reversal()
 
 
 def _settings() -> dict[str, Method]:
@@ -90,3 +94,6 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
+
+SHEETS = by(LABELLERS["run"]) | _covers()
+"""Methods that differ in pitch, cover and closing force."""

@@ -13,19 +13,33 @@ from contactfpga_sim.apps import pool, speed
 from contactfpga_sim.apps.stats import Interval
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.chart import front_picture, host, numbers, times_picture
-from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, covered, front, reached_us, study, to_build
-from contactfpga_sim.lab.chart.methods import METHODS
+from contactfpga_sim.lab.chart.compute import (
+    FAMILIES_DRAWN,
+    Point,
+    Task,
+    covered,
+    front,
+    in_all,
+    reached_us,
+    study,
+    to_build,
+)
+from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
 
 NUMBERS = Path("docs/chart/chart.csv")
 
 PLACEMENTS = 400
 
-SHEETS = (16, 32, 64)
+SIDES = (16, 32, 64)
 
 
 def compute() -> list[Point]:
+    """All methods with one family, and with the others those that differ in the sheet."""
     tasks = [
-        Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
+        Task(name, *method, family, PLACEMENTS, 0)
+        for family in FAMILIES_DRAWN
+        for name, method in METHODS.items()
+        if family == front_picture.FAMILY or name in SHEETS
     ]
     with pool.executor() as executor, pool.progress() as step:
         points = study(tasks, executor, True, step)
@@ -80,7 +94,7 @@ def families_table(points: list[Point]) -> writer.Table:
     families = list(dict.fromkeys(point.task.family for point in points))
     by = {(point.task.method, point.task.family): point for point in points}
     rows: dict[object, tuple[str, ...]] = {}
-    for method in dict.fromkeys(point.task.method for point in points):
+    for method in in_all(points):
         some = [by[method, family] for family in families]
         found = [point.errors["total"] for point in some]
         shares = [f"{_percent(one['miscounted'])}; {100 * one['missed'].mean:.1f} %" for one in found]
@@ -121,7 +135,7 @@ def _percent(share: Interval) -> str:
 def host_table() -> writer.Table:
     """The page shows the least count for which the host is faster, for each sheet."""
     rows, shown = [], []
-    for size in SHEETS:
+    for size in SIDES:
         skin = Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
         most = min(size * size // 4, skin.derived.max_items)
         # Zones take longer the more there are, cells do not.

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -12,10 +14,11 @@ import numpy as np
 from contactfpga import picture_style as style
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
+from contactfpga_sim.apps import pool
 from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.failures import tables
 from contactfpga_sim.lab.haptics import breaks, coverage, felt
-from contactfpga_sim.lab.haptics.coverage import CoverageCase
+from contactfpga_sim.lab.haptics.coverage import Coverage, CoverageCase
 from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
@@ -51,8 +54,7 @@ def _layout(rating: Rating, before: str = "") -> list[str]:
 
 def places_table() -> str:
     rows = [["method", "pitch", "error", "the barycenter's", "stated radius", "over theory", "covers"]]
-    for case in coverage.RIGHT:
-        found = coverage.run(case, CONTACTS)
+    for case, found in _covered(coverage.RIGHT):
         theory = "" if math.isnan(found.theory_m) else f"{found.radius_m / found.theory_m:.2f}"
         lengths = [f"{1e3 * one:.2f} mm" for one in (found.rms_m, found.barycenter_m, found.radius_m)]
         rows.append([case.method, f"{case.pitch_mm:g} mm", *lengths, theory, _percent(found.covered)])
@@ -61,11 +63,15 @@ def places_table() -> str:
 
 def wrong_table() -> str:
     rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
-    for case in coverage.WRONG:
-        found = coverage.run(case, CONTACTS)
+    for case, found in _covered(coverage.WRONG):
         lengths = [f"{1e3 * one:.2f} mm" for one in (found.rms_m, found.barycenter_m, found.radius_m)]
         rows.append([_named(case), case.wrong, *lengths, _percent(found.covered), _percent(found.disagreed)])
     return writer.table_of(rows)
+
+
+def _covered(cases: Sequence[CoverageCase]) -> Iterator[tuple[CoverageCase, Coverage]]:
+    with pool.executor() as workers:
+        yield from zip(cases, workers.map(coverage.run, cases, itertools.repeat(CONTACTS)), strict=True)
 
 
 def _named(case: CoverageCase) -> str:
@@ -85,7 +91,8 @@ APART_MM = (30.0, 60.0, 100.0)
 @functools.cache
 def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
     """(contacts, times) errors in m by method."""
-    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
+    with pool.executor() as workers:
+        each = list(workers.map(felt.errors, itertools.repeat(setting), range(count), itertools.repeat(times_s)))
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 

@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 import contactfpga
+from contactfpga.driver.pace import Pace
 from contactfpga.tools.view.simulated import ALL, SKINS, SimulatedSource
-from contactfpga.tools.view.sources import SimulatedPace
 from contactfpga_sim.lab.writer import table_of
 
 ARM = contactfpga.examples() / "arm"
@@ -22,7 +22,7 @@ STEP_S, ENDS_S = 1e-3, 0.25
 """MuJoCo's step, and a time by which all arms touched the bar and all but one let go."""
 
 
-class Asked(SimulatedPace):
+class Asked(Pace):
     """A pace that runs the robots up to a given moment."""
 
     until_s = 0.0

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
+from contactfpga.recordings import Recording, Session
 from contactfpga.skin import Skin
-from contactfpga.tools.recordings import Recording, link_recorder
+from contactfpga.tools.recordings.link_recorder import LinkRecorder
 from contactfpga.tools.recordings.recover import recover
-from contactfpga.tools.recordings.session import Session
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
@@ -108,15 +108,16 @@ def _record(port: str, file: str, log: str) -> None:
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
     count = 0
 
-    class Logged(link_recorder.Buffer):
-        def take(self, data: bytes, clock_s: float) -> None:
-            nonlocal count
-            super().take(data, clock_s)
-            count += len(data)
-            os.write(descriptor, _PIECE.pack(time.monotonic(), count))
+    take = LinkRecorder.take
 
-    session = Session(file, buffer=Logged)
-    with session:
+    def logged(link: LinkRecorder, data: bytes, clock_s: float) -> None:
+        nonlocal count
+        take(link, data, clock_s)
+        count += len(data)
+        os.write(descriptor, _PIECE.pack(time.monotonic(), count))
+
+    LinkRecorder.take = logged  # type: ignore[assignment, method-assign]
+    with Session(file) as session:
         session.add(port, name="skin")
         session.start()
         while session.running:

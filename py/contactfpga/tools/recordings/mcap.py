@@ -1,4 +1,4 @@
-"""Reader of boards' bytes in the MCAP file or files of one `contactfpga record`.
+"""Reader of boards' bytes in an MCAP file.
 
 Classes of the MCAP library read each record. Where records are and how much is unpacked is decided here, because the
 library's readers believe stated sizes, and keep every chunk that they were asked for.
@@ -17,11 +17,10 @@ from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
+from contactfpga.driver.address import MAX_LINKS, MAX_NAME
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import shell_words
-from contactfpga.skin.derived import LONGEST_PACKET
-from contactfpga.wire.hello import find_hello
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Chunk, ChunkIndex, Schema
@@ -173,9 +172,6 @@ METADATA = "contactfpga"
 _BEGIN = struct.Struct("<4xiII")
 _COUNT = struct.Struct("<I")
 
-MAX_LINKS = 64
-MAX_NAME = 256
-"""Most characters of a link's name, which tables repeat in each row."""
 MAX_TEXTS = 1000
 _FOOTER_BYTES = HEAD + 20 + len(MAGIC)
 
@@ -387,23 +383,30 @@ class McapPart:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
-        try:
-            import mcap.records  # noqa: F401
-        except ModuleNotFoundError as error:
-            raise MissingExtra(f"{self.path} ({error})", "record") from None
-        try:
-            file = open_regular(self.path)
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be opened: {error.strerror or told(error)}") from None
-        with file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise RecordingError(f"{self.path} is no MCAP file")
+        with opened(self.path) as file:
             try:
                 yield file
             except (Unreadable, struct.error, OSError) as error:
                 why = str(error if isinstance(error, Unreadable) else Unreadable())
                 recover = shell_words("contactfpga", "record", "--recover", self.path)
                 raise RecordingError(f"{self.path} {why.replace('{recover}', recover)}") from None
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """An MCAP file at its first record. Raises :class:`RecordingError`, :class:`MissingExtra`."""
+    try:
+        import mcap.records  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"{path} ({error})", "record") from None
+    try:
+        file = open_regular(path)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be opened: {error.strerror or told(error)}") from None
+    with file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise RecordingError(f"{path} is no MCAP file")
+        yield file
 
 
 def _apart(file: BinaryIO, places: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
@@ -426,107 +429,3 @@ def data_of(message: bytes) -> bytes:
     at = -(-(_BEGIN.size + name) // 4) * 4
     (count,) = _COUNT.unpack_from(message, at)
     return message[at + 4 : at + 4 + count]
-
-
-HELLO_NS = 600_000_000
-
-
-class McapBytes:
-    """A recording whose files were closed or recovered. Calls of :meth:`pieces` are independent."""
-
-    def __init__(self, path: str | Path):
-        self.path = Path(path)
-        self._parts = [McapPart(one) for one in files_of(self.path)]
-        held = {link for part in self._parts for link in part.links}
-        added = [facts.get("link", "") for facts in self.texts(METADATA)]
-        self._links = sorted(held, key=lambda link: (added.index(link) if link in added else len(added), link))
-        if not self._links:
-            raise RecordingError(f"{path} holds no bytes of a board; `contactfpga record` makes files that do")
-        parts = [part for part in self._parts if part.links]
-        self.start_ns = min(part.start_ns for part in parts)
-        self.end_ns = max(part.end_ns for part in parts)
-
-    @property
-    def links(self) -> list[str]:
-        """Names of the links, in order of addition."""
-        return list(self._links)
-
-    def checked(self, link: str | None) -> str:
-        """The link of this name; None: the only one. Raises :class:`RecordingError`."""
-        if link is None and len(self._links) == 1:
-            return self._links[0]
-        if link in self._links:
-            return link
-        names = ", ".join(self._links)
-        if link is None:
-            raise RecordingError(f"{self.path} holds several links; name one of them: {names}")
-        raise RecordingError(f"{self.path} has no link {link!r}; it has {names}")
-
-    def texts(self, name: str) -> list[dict[str, str]]:
-        found: list[dict[str, str]] = []
-        for part in self._parts:
-            found += [one for one in part.texts(name) if one not in found]
-        return found
-
-    def pieces(self, link: str | None = None, start_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
-        """(arrival of the last byte in ns, bytes) of a link, in order: from the last hello that arrived by
-        ``start_ns``, or from the beginning.
-        """
-        link = self.checked(link)
-        if start_ns is None:
-            yield from self._read(link)
-            return
-        begin_ns, at = start_ns, -1
-        for begin_ns in (start_ns - HELLO_NS, start_ns - 8 * HELLO_NS, self.start_ns):
-            if (at := _last_hello(self._read(link, begin_ns, start_ns + 1))) >= 0:
-                break
-        yield from _after(self._read(link, begin_ns, start_ns + 1), max(0, at))
-        yield from self._read(link, start_ns + 1)
-
-    def _read(self, link: str, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
-        for part in self._parts:
-            yield from part.read(link, begin_ns, end_ns)
-
-
-class McapStream:
-    """The bytes of one link as a readable stream."""
-
-    def __init__(self, path: str | Path, link: str | None, start_s: float):
-        file = McapBytes(path)
-        start_ns = file.start_ns + round(start_s * 1e9)
-        if start_ns > file.end_ns:
-            lasts_s = (file.end_ns - file.start_ns) / 1e9
-            raise RecordingError(f"{path} lasts {lasts_s:.3f} s; it cannot start at {start_s:g} s")
-        self._pieces = file.pieces(file.checked(link), start_ns if start_s else None)
-        self._piece, self._taken = b"", 0
-
-    def read(self, count: int) -> bytes:
-        """At most ``count`` bytes; b"" at the end."""
-        while self._taken >= len(self._piece):
-            if (piece := next(self._pieces, None)) is None:
-                return b""
-            self._piece, self._taken = piece[1], 0
-        data = self._piece[self._taken : self._taken + count]
-        self._taken += count
-        return data
-
-    def close(self) -> None:
-        self._pieces.close()  # type: ignore[attr-defined]
-
-
-def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
-    found, before, held = -1, 0, b""
-    for _, data in pieces:
-        data = held + data
-        if (at := find_hello(data, last=True)) >= 0:
-            found = before + at
-        held = data[data.rfind(0) + 1 :][-LONGEST_PACKET:]
-        before += len(data) - len(held)
-    return found
-
-
-def _after(pieces: Iterable[tuple[int, bytes]], at: int) -> Iterator[tuple[int, bytes]]:
-    for moment, data in pieces:
-        if at < len(data):
-            yield moment, data[at:]
-        at = max(0, at - len(data))
