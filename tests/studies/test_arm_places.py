@@ -140,7 +140,7 @@ def test_the_sentence_names_what_takes_the_most():
 def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
     path = tmp_path / "tiles.toml"
     path.write_text(
-        'like = "paper"\nmodel = "frictionless"\n[foam]\ncut = true\n[cap]\nside_m = 0.0058\n'
+        'like = "paper"\nmodel = "foam"\n[foam]\ncut = true\n[cap]\nside_m = 0.0058\n'
         "[switch]\nforce_n = 0.4\ntravel_m = 0.2e-3\nspread = 0.1\n"
     )
     assert Case.load(path) == BEST.case().but(cap={"side_m": 0.0058})
