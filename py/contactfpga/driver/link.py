@@ -13,7 +13,7 @@ from typing import Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.clock import ClockFit
-from contactfpga.driver.conversation import Arrival, Conversation, Event
+from contactfpga.driver.conversation import Conversation, Event
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.driver.stats import NetCounters, Stats, refused
@@ -278,7 +278,7 @@ class Link:
         return 0 if self.net is None else self.net.denied
 
     def _take(self, data: bytes) -> None:
-        for event in self.conversation.receive_runs(data, self.transport.clock()):
+        for event in self.conversation.receive(data, self.transport.clock()):
             self._pass_on(event)
         self.changed.notify_all()
         if not self.transport.threaded:
@@ -302,13 +302,13 @@ class Link:
             while self._reading is None and self._read_once(0.0):
                 pass
 
-    def _pass_on(self, event: Event | Run) -> None:
+    def _pass_on(self, event: Event) -> None:
         if isinstance(event, Hello):
             self._log(event)
             return
         if isinstance(event, Faults):
             self._log_fault(f"fault: {', '.join(event.names)}" if event else "")
-        item = event.zones if isinstance(event, Arrival) else event
+        item = event[0] if isinstance(event, Run) and len(event) == 1 else event
         between = isinstance(item, SideEvent)
         for queue in self._queues:
             if queue.all_events or not between:
@@ -318,13 +318,11 @@ class Link:
         if isinstance(item, (Zones, Run)):
             self._frames += 1 if isinstance(item, Zones) else len(item)
             self.last, self.last_s, self._last_bytes = item, self.transport.clock(), self.conversation.stats.bytes
-        if isinstance(event, Run):  # what it answers, the frame before it has answered
-            return
         for waiter in self._waiters:
             if waiter.found is not None:
                 continue
-            if isinstance(event, Arrival):
-                waiter.found = event.zones if event.answers >= waiter.ticket else None
+            if isinstance(event, Run):  # what more than one frame answer, the one before them has answered
+                waiter.found = item if isinstance(item, Zones) and event.answers >= waiter.ticket else None
             elif isinstance(event, ContactFPGAError) and self.conversation.sheet is None:
                 # Another Skin that can be read is no trouble for a new frame.
                 waiter.found = event

@@ -8,21 +8,18 @@ import re
 import stat
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Protocol
+from typing import BinaryIO, Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import REPLAY_FORM, Replay
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.mcap import MAGIC, McapStream, files_of
 from contactfpga.driver.pace import Pace
 from contactfpga.driver.transport import Transport, counters_of, skins_of
 from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.skin.derived import LONGEST_PACKET
-
-if TYPE_CHECKING:
-    pass
-
+from contactfpga.zones.run import Run
 
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
 
@@ -203,8 +200,8 @@ class _PacedPackets:
                 packet += more
             self._held = bytes(packet)
             for event in self._conversation.receive(self._held, 0.0):
-                if isinstance(event, Arrival):
-                    self._schedule(event.zones.time_us / 1e6)
+                if isinstance(event, Run):
+                    self._schedule(event.times_us[-1] / 1e6)
         wait_s = 0.0 if self._pace is None else self._pace.wait_s(self._last_s)
         if wait_s > 0:
             time.sleep(min(wait_s, max(0.0, timeout_s)))

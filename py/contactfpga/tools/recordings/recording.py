@@ -11,14 +11,13 @@ from pathlib import Path
 
 from contactfpga import notebook
 from contactfpga.choices.choice import refuse_modules
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.driver.mcap import METADATA, McapBytes, RecordingError
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
-from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 Timed = tuple[float, str, Zones]
@@ -106,7 +105,7 @@ class Recording:
         last_s = -math.inf
         for moment_ns, data in self._file.pieces(link, start_ns):
             moment_s = self._seconds(moment_ns)
-            found = [zones for event in conversation.receive_runs(data, 0.0) for zones in _frames_of(event)]
+            found = frames_in(conversation.receive(data, 0.0))
             self.unused[link] = conversation.unused
             # The last one had come by then, and the board's clock says how long before it the others were scanned.
             for zones in found:
@@ -134,10 +133,3 @@ def _skin(text: str) -> Skin | None:
         return Skin(**values) if text else None
     except (TypeError, ValueError):  # of another version, or with a module; the hello is known all the same
         return None
-
-
-def _frames_of(event: object) -> Iterator[Zones]:
-    if isinstance(event, Run):
-        yield from event
-    elif isinstance(event, Arrival):
-        yield event.zones

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from contactfpga.driver import driver
 from contactfpga.driver.address import REPLAY, Replay
 from contactfpga.driver.board import Board
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.mcap import MAGIC, SUFFIX, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
@@ -172,17 +172,10 @@ class LinkRecording:
         conversation = Conversation(self.title, live=False)
         found = []
         for seconds, data in self.recording.raw_bytes(self._link):
-            times_us = [_last_us(event) for event in conversation.receive_runs(data, 0.0)]
-            if known := [time_us for time_us in times_us if time_us is not None]:
-                found.append((seconds, seconds - known[-1] / 1e6))
+            if runs := [event for event in conversation.receive(data, 0.0) if isinstance(event, Run)]:
+                found.append((seconds, seconds - runs[-1].times_us[-1] / 1e6))
         least = min((late for _, late in found), default=0.0)
         return ((seconds, late - least) for seconds, late in found)
-
-
-def _last_us(event: object) -> int | None:
-    if isinstance(event, Run):
-        return int(event.times_us[-1])
-    return event.zones.time_us if isinstance(event, Arrival) else None
 
 
 def _pieces(board: Board) -> Iterator[_Piece]:
