@@ -12,10 +12,10 @@ from wire import digits, seal
 
 import contactfpga
 from contactfpga.driver import native
+from contactfpga.driver.conversation import frames_in
 from contactfpga.driver.native import Unsettled
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
-from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 NAMES = [*SKINS, "guard", "units"]
@@ -42,8 +42,6 @@ def told(item):
     """All that a user can see of what came."""
     if isinstance(item, Zones):
         return repr((item.to_dict(), sorted(item.flags), item.sheet, item.frame.heard, item.suspects))
-    if isinstance(item, Run):
-        return [told(zones) for zones in item]
     return repr(item)
 
 
@@ -97,10 +95,9 @@ class Followers:
             case 0 | 1:
                 self.pop(self.rng.randrange(40))
             case 2 if not self.all_events:
-                found = [queue.pop_frames() for queue in self.queues]
-                flat = [[told(z) for one in some for z in (one if isinstance(one, Run) else [one])] for some in found]
-                assert flat[0] == flat[1]
-                self.seen += len(flat[0])
+                first, second = ([told(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
+                assert first == second
+                self.seen += len(first)
             case 3 if not self.all_events:
                 assert self.kept(thread) == self.kept(fast)
             case 4:

@@ -13,7 +13,7 @@ from sample import sample
 
 import contactfpga
 from contactfpga.driver import conversation
-from contactfpga.driver.conversation import Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.wire import table
 from contactfpga.zones.batch import Batch
@@ -114,9 +114,8 @@ def test_a_batch_holds_what_its_frames_hold(name, rng):
     stream = board.hello() + b"".join(random_frame(board, rng) for _ in range(400))
     runs = [event for event in Conversation("x").receive(stream, 1.5) if isinstance(event, Run)]
     assert max(map(len, runs)) >= LONG
-    parts = [run[0] if len(run) == 1 else run for run in runs]
-    batch = Batch.of(parts)
-    frames = [zones for part in parts for zones in (part if isinstance(part, Run) else [part])]
+    batch = Batch.of([run[0] if len(run) == 1 else run for run in runs])
+    frames = frames_in(runs)
     for name in ("sequence", "time_us", "host_time_s", "total_zones", "pressed"):
         assert batch.frames[name].tolist() == [getattr(zones, name) for zones in frames], name
     assert np.diff(batch.starts).tolist() == [len(zones) for zones in frames]
@@ -130,15 +129,14 @@ def test_a_batch_holds_what_its_frames_hold(name, rng):
 # ---- the queue
 
 
-def runs_and_frames(rng, count):
-    """What a queue may get: frames alone, runs and errors, and the same in a plain list."""
+def runs_and_errors(rng, count):
+    """What a queue may get."""
     board = ModelBoard(SKINS["moments"])
     host = Conversation("x")
     host.receive(board.hello(), 0.0)
     for _ in range(count):
         stream = b"".join(board.frame() for _ in range(rng.choice([1, 3, 60])))
-        for run in host.receive(stream, 0.0):
-            yield run[0] if len(run) == 1 else run
+        yield from host.receive(stream, 0.0)
         if rng.random() < 0.1:
             yield contactfpga.SkinMismatch("another bitstream")
 
@@ -151,13 +149,12 @@ def times(items):
 def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rng):
     """Whether it waits already or is yet to come."""
     queue, plain, came, seen = FrameQueue(maxsize, came=5), [], 5, 5
-    for item in runs_and_frames(rng, 300):
+    for item in runs_and_errors(rng, 300):
         if isinstance(item, Exception):
             continue
         queue.put(item)
-        frames = list(item) if isinstance(item, Run) else [item]
-        plain += [(came + index, zones) for index, zones in enumerate(frames, 1)]
-        came += len(frames)
+        plain += [(came + index, zones) for index, zones in enumerate(item, 1)]
+        came += len(item)
         plain = [one for one in plain if one[0] > seen][-maxsize:]
         seen = came - len(plain) if seen < came else seen
         match rng.randrange(5):
@@ -166,14 +163,11 @@ def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rn
                 assert queue.show(number) == (number > seen)
                 seen = max(seen, number)
                 plain = [one for one in plain if one[0] > seen]
-                if isinstance(item, Zones) and rng.random() < 0.5:
-                    queue.skip_to(item)
-                    seen, plain = max(seen, came), []
             case 1 if plain:
                 seen, zones = plain.pop(0)
                 assert queue.pop().time_us == zones.time_us
             case 2:
-                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                found = frames_in(queue.pop_frames())
                 assert times(found) == times([zones for _, zones in plain])
                 seen, plain = max(seen, came), []
         assert (len(queue), queue.seen) == (len(plain), seen)
@@ -183,28 +177,22 @@ def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rn
 @pytest.mark.parametrize("maxsize", [1, 7, 100, 10_000])
 def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
     queue, plain, dropped = FrameQueue(maxsize), [], 0
-    for item in runs_and_frames(rng, 300):
+    for item in runs_and_errors(rng, 300):
         queue.put(item)
         plain += item if isinstance(item, Run) else [item]
         gone, plain = plain[: max(0, len(plain) - maxsize)], plain[max(0, len(plain) - maxsize) :]
         dropped += sum(isinstance(one, Zones) for one in gone)
         assert (queue.dropped, len(queue)) == (dropped, len(plain))
-        match rng.randrange(8):
+        match rng.randrange(6):
             case 0 | 1:
                 for _ in range(min(rng.randrange(5), len(plain))):
                     assert times([queue.pop()]) == times([plain.pop(0)])
             case 2:
                 head = next((at for at, one in enumerate(plain) if isinstance(one, Exception)), len(plain))
-                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                found = frames_in(queue.pop_frames())
                 assert times(found) == times(plain[:head])
                 plain = plain[head:]
-            case 3 if isinstance(item, Zones):
-                queue.skip_to(item)
-                plain = []
-            case 4 if len(plain) < maxsize and isinstance(item, Zones):
-                queue.put_back(item)
-                plain.insert(0, item)
-            case 5 if not any(isinstance(one, Exception) for one in plain):
+            case 3 if not any(isinstance(one, Exception) for one in plain):
                 queue.keep_last()
                 plain = plain[-1:]
         assert (queue.first_error() is None) == (not plain or not isinstance(plain[0], Exception))
@@ -215,7 +203,7 @@ def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
 def test_one_frame_is_not_both_shown_and_taken(take):
     """The C reader's `latest()` shows a frame without the board's lock, as another thread takes the next one."""
     queue, drop, shown = FrameQueue(4), FrameQueue._drop_shown, []
-    queue.put(Zones.__new__(Zones))
+    queue.put(next(runs_and_errors(random.Random(1), 1)))
     thread = threading.Thread(target=lambda: shown.append(queue.show(1)))
 
     def drop_and_pause():
