@@ -10,7 +10,7 @@ from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Place
+from contactfpga_sim.lab.knobs import Place
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet.wiring import LineCuts
 
