@@ -305,6 +305,40 @@ def test_neither_shows_a_frame_after_a_restart_as_the_one_after_a_wrap(pairs):
     assert facts(pair.thread) == facts(pair.native)
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_reads_of_many_seconds_that_are_taken_together_say_the_same(pairs, asked):
+    """With a request that the board does not hear, which is sent again and again."""
+    pair, board = pairs(), ModelBoard(contactfpga.Skin())
+    pair.take(board.hello() + board.frame())
+    pair.pass_time()
+    looks = ask(pair, 100.0) if asked else []
+    for _ in range(12):
+        pair.now += 1.0
+        board.time_us += 1_000_000
+        pair.take(board.frame())
+    assert len(pair.sent()) > 30 or not asked
+    assert facts(pair.thread) == facts(pair.native)
+    assert pair.native.conversation.stats.frames == 13
+    assert not any(look() for look in looks)
+
+
+def test_frames_that_come_as_the_decoder_learns_of_their_sheet_are_not_lost(pairs, monkeypatch):
+    """In C they are no frames yet."""
+    pair, board = pairs(), ModelBoard(contactfpga.Skin())
+    core, take = pair.native._core, pair.native._core.take
+
+    def take_as_more_comes():
+        found = take()
+        core.feed(board.frame(), 0.0)
+        return found
+
+    pair.take(board.hello() + board.frame())
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(core, "take", take_as_more_comes)
+        pair.native.catch_up()
+    assert pair.native.conversation.stats.frames == 2
+
+
 def test_what_the_ring_overwrites_counts_as_lost(pairs):
     """As if the line had lost it; the newest frame is always there."""
     pair, board = pairs(), ModelBoard(SKINS["moments"])

@@ -400,7 +400,7 @@ class HostClock:
     def take_reads(
         self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
     ) -> HostLines | None:
-        """The host's lines of successive reads that answer no request, after :attr:`begun`; None in a recording.
+        """The host's lines of successive reads that answer no request, after a frame; None in a recording.
         ``arrived_s`` and ``counts``: arrival and number of frames of each read; ``times_us`` and ``sizes``: time and
         bytes of its last frame.
         """
@@ -408,10 +408,6 @@ class HostClock:
             return None
         lines = self.fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
         return HostLines(*(np.repeat(values, counts) for values in (arrived_s, *lines)))
-
-    @property
-    def begun(self) -> bool:
-        return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:
         """End the packets that arrived together."""

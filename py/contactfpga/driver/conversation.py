@@ -208,7 +208,7 @@ class Conversation:
         if reads.table is None or self.frame_format != reads.frame_format or first == len(reads.table.packets):
             return at
         end = reads.last_within(at, reads.run_ends[first])
-        if end <= at + 1 or not self._requests.idle or not self._clock.begun:
+        if end <= at + 1 or not self._requests.idle:
             return at
         return at if self._stands_alone(reads.table.packets[first]) else end
 
