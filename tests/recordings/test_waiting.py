@@ -83,7 +83,7 @@ def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed)
 
     paused(link_recorder.LinkRecorder, "take")
     paused(link_recorder.LinkRecorder, "end_at")
-    paused(Conversation, "receive_runs")
+    paused(Conversation, "receive")
     file = tmp_path / "touches.mcap"
     with Streaming(contactfpga.Skin()) as board, Session(file) as session:
         session.add(board.path, timeout=60.0)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contactfpga import notebook
 from contactfpga.choices.choice import refuse_modules
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.pace import DeviceClock
 from contactfpga.errors import SkinError, VersionMismatch
 from contactfpga.inputs import tomlfile
@@ -84,8 +84,9 @@ class Recording:
         conversation, clock, last_s = Conversation(str(self.path), live=False), DeviceClock(), 0.0
         size = self.path.stat().st_size
         for _, data in self.pieces():
-            for times_us, _ in _runs(conversation, data):
-                last_s = [clock.take(time_us) for time_us in times_us][-1]
+            for run in conversation.receive(data, 0.0):
+                if isinstance(run, Run):
+                    last_s = [clock.take(time_us) for time_us in run.times_us.tolist()][-1]
             self._reading(conversation.stats.bytes, size)
         return last_s
 
@@ -178,18 +179,18 @@ class Recording:
         conversation = Conversation(f"{self.path}, link {link!r}", live=False)
         clock, last_s = DeviceClock(), 0.0
         for moment_s, data in self.pieces(link, start_s):
-            runs = list(_runs(conversation, data))
+            runs = [event for event in conversation.receive(data, 0.0) if isinstance(event, Run)]
             self.unused[link] = conversation.unused
             # The last one had come by then, and the board's clock says how long before it the others were scanned.
-            last_us = runs[-1][0][-1] if runs else 0
-            for times_us, frames in runs:
-                for index, time_us in enumerate(times_us):
+            last_us = int(runs[-1].times_us[-1]) if runs else 0
+            for run in runs:
+                for index, time_us in enumerate(run.times_us.tolist()):
                     before_s = max(0.0, (last_us - time_us) / 1e6)
                     last_s = max(last_s, moment_s - before_s) if self.timed else clock.take(time_us)
                     if last_s >= end_s:
                         return
                     if last_s >= start_s:
-                        yield last_s, link, frames[index]
+                        yield last_s, link, run[index]
 
     def _hello(self, link: str) -> Hello | VersionMismatch | None:
         conversation, old = Conversation(str(self.path), live=False), None
@@ -200,15 +201,6 @@ class Recording:
                 return conversation.hello
         self.unused[link] = conversation.stats.bytes
         return old
-
-
-def _runs(conversation: Conversation, data: bytes) -> Iterator[tuple[list[int], Run | list[Zones]]]:
-    """(device times in us, frames), of the successive frames that ``data`` completes."""
-    for event in conversation.receive_runs(data, 0.0):
-        if isinstance(event, Run):
-            yield event.times_us.tolist(), event
-        elif isinstance(event, Arrival):
-            yield [event.zones.time_us], [event.zones]
 
 
 def _skin(text: str) -> Skin | None:

@@ -7,13 +7,14 @@ import time
 from collections.abc import Iterable, Iterator
 
 from contactfpga.driver.address import REPLAY_FORM, Replay
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.pace import DeviceClock, Pace
 from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.tools.recordings.mcap import RecordingError, files_of
 from contactfpga.tools.recordings.recording import CHUNK, Recording
+from contactfpga.zones.run import Run
 
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
 
@@ -96,8 +97,8 @@ def _timed(name: str, pieces: Iterable[bytes]) -> Iterator[tuple[bytes, float]]:
             packets, held = [*packets, held], b""
         for packet in packets:
             for event in conversation.receive(packet, 0.0):
-                if isinstance(event, Arrival):
-                    at_s = clock.take(event.zones.time_us)
+                if isinstance(event, Run):
+                    at_s = clock.take(int(event.times_us[-1]))
             yield packet, at_s
     if held:
         yield held, at_s

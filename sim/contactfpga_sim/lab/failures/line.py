@@ -11,7 +11,7 @@ import numpy as np
 
 from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS
@@ -118,8 +118,7 @@ def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
 def _decoded(data: bytes) -> tuple[list[str], Conversation]:
     conversation = Conversation("the line")
     events = conversation.receive(data, 0.0)
-    arrived = [event.zones for event in events if isinstance(event, Arrival)]
-    return [str(_sent(zones)) for zones in arrived], conversation
+    return [str(_sent(zones)) for zones in frames_in(events)], conversation
 
 
 def _sent(zones: Zones) -> dict[str, object]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga import picture_style as style
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import knobs, writer
@@ -48,10 +48,9 @@ def _round(chunks: list[bytes]) -> FrameRates:
 
     def decode() -> None:
         for chunk in chunks:
-            for event in host.receive(chunk, 0.0):
-                if isinstance(event, Arrival):
-                    event.zones[0]  # its places, which are computed when they are asked for
-                    arrived.append(event.zones)
+            for zones in frames_in(host.receive(chunk, 0.0)):
+                zones[0]  # its places, which are computed when they are asked for
+                arrived.append(zones)
 
     tracker = Tracker()
     decoded = _rate(decode, len(chunks))
