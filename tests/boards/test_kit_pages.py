@@ -6,10 +6,12 @@ import random
 import re
 import tomllib
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit, needed
@@ -19,8 +21,9 @@ from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
-from contactfpga_sim.lab.kits import predict
+from contactfpga_sim.lab.kits import counts, predict
 from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.scenes.families import placements
 
 ONE = Prediction(
     "settle_us", "what", "us", 1.0, 0.5, 2.0, "circuit", "contactfpga settle", datetime.date(2026, 11, 24), "abc"
@@ -122,3 +125,14 @@ def test_the_tutorial_lists_the_parts_of_the_starter_kit():
     beside = re.findall(r"^\| (\d+) \| ([^|]*) \|$", page, re.MULTILINE)
     assert [int(count) for count, _ in beside] == [part.count for part in kit.parts]
     assert all(part.number in what for part, (_, what) in zip(kit.parts, beside, strict=True))
+
+
+def test_a_scene_is_miscounted_whose_zones_are_not_as_many_as_its_contacts():
+    """The oracle is scipy's: fingers 5 mm apart are as many contacts."""
+    kit = kits.kit("starter")
+    cover, drawn = load_cover(kit.skin_path), counts.Drawn("light fingers", "fingers", 60, (0.5, 1.5))
+    with ThreadPoolExecutor(1) as workers:
+        found = counts.miscounted(kit.skin, cover, drawn, workers)
+    scenes = placements("fingers", 60, counts.SEED, kit.skin, force_n=(0.5, 1.5))
+    wrong = [ndimage.label(one.pressed(0.0, kit.skin, cover))[1] != len(one.contacts) for one in scenes]
+    assert 0 < found.hits == sum(wrong) < found.of == 60

@@ -321,3 +321,16 @@ def test_a_switch_with_hysteresis_remembers():
     cover = Cover("foam", 1e-3, Switch(0.5, hysteresis=0.2), cap=Cap(9e-3), cut=True)
     cells = finger.on(Skin(), cover)
     assert [int(cells(t).sum()) for t in (0.45, 0.55, 1.0, 1.55, 1.65)] == [0, 1, 1, 1, 0]
+
+
+def test_each_scene_of_a_family_is_on_a_sheet_drawn_for_it():
+    """The switch that gives way first is another one on other sheets, and the same on the same."""
+    cover = Cover("foam", 2e-3, Switch(0.4, 5.8e-3**2, spread=0.3), cap=Cap(5.8e-3), cut=True)
+    skin = Skin(pitch_x_mm=6.4, pitch_y_mm=6.4)
+    scenes = [placements("palm", 4, seed, skin) for seed in (0, 0, 1)]
+    plate = (Contact(shape=contacts.edge(102.4, 102.4), x_mm=48.0, y_mm=48.0, force_n=0.4 * 256, body="rigid"),)
+    first, again, other = (
+        [Scene(plate, one.drawn).pressed(0.0, skin, cover).tobytes() for one in some] for some in scenes
+    )
+    assert first == again
+    assert len({*first, *other}) == 8

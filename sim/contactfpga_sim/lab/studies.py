@@ -120,6 +120,7 @@ _ALL = (
         sections=tables(
             "times built",
             kits=Section("tables:headline", page="../README.md"),
+            counts=Section("tables:counts_table"),
             parts=Section("tables:parts_table", sample="tables:parts_table"),
             predictions=Section("tables:predictions_table", sample="tables:predictions_table"),
         ),

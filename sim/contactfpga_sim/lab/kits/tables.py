@@ -13,23 +13,25 @@ from typing import NamedTuple
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
-from contactfpga.design.cover import load_cover
+from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
+from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, placed
-from contactfpga_sim.apps import pool
+from contactfpga_sim.apps import covers, pool
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import Spread
 from contactfpga_sim.apps.latency.stages import Finger
 from contactfpga_sim.apps.latency.usb import BridgeSettings
+from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.kits import counts
+from contactfpga_sim.lab.kits.counts import Drawn
 
 NAMES = ("starter", "fast")
 SEEDS = (1, 2, 3)
 """Seeds of place and route."""
-COVER = "| run, 6.4 mm, tiles |"
-PAPER = "| run, 6.4 mm, paper |"
 PEAKS = {
     "UART": "that an arm runs into anywhere, worst / mean",
     "6 ms": "if the stop comes 6 ms late",
@@ -70,7 +72,9 @@ def _worst_first(us: Spread, digits: int = 0) -> str:
 def headline(found: list[KitFigures]) -> str:
     """The README's table: both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
-    fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
+    skin = found[0].kit.skin
+    paper = skin, covers.paper(skin.pitch_x_mm)
+    *fingers, paper_fingers = (_share(rate) for rate in _rates(counts.FINGERS, paper))
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
@@ -90,8 +94,8 @@ def headline(found: list[KitFigures]) -> str:
             "the same",
         ),
         (
-            "[Scenes of two to five fingers miscounted](docs/chart.md#every-method), 95 % interval",
-            *(f"**{fingers}**",) * 2,
+            f"[Scenes of {counts.FINGERS.name}](docs/kits.md#how-many-touches) miscounted, 95 % interval",
+            *(f"**{one}**" for one in fingers),
             f"{paper_fingers} with the paper's switch and foam at this pitch",
         ),
         *(_peak_row(way, found) for way in PEAKS),
@@ -108,10 +112,21 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
     )
 
 
-def _of_page(page: str, start: str, column: int) -> str:
-    text = Path("docs", page).read_text(encoding="utf-8")
-    found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
-    return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
+def _rates(scenes: Drawn, *beside: tuple[Skin, Cover]) -> list[Rate]:
+    """Of both kits, and of sheets beside them."""
+    sheets = [(kit.skin, load_cover(kit.skin_path)) for kit in map(kits.kit, NAMES)]
+    with pool.executor() as workers:
+        return [counts.miscounted(*sheet, scenes, workers) for sheet in (*sheets, *beside)]
+
+
+def counts_table() -> str:
+    rows = [(scenes.name, *(_share(rate) for rate in _rates(scenes))) for scenes in counts.SCENES]
+    return writer.table_of([("scenes", *NAMES), *rows])
+
+
+def _share(rate: Rate) -> str:
+    low, high = rate.interval()
+    return f"{100 * rate.hits / rate.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def _sheet(kit: Kit) -> tuple[str, float, float, float]:

@@ -241,7 +241,7 @@ def scene_of(file: SceneFile, number: int, skin: Skin, cover: Cover | None = Non
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
         if (contacts := _apart(rng, file, skin)) is not None:
-            scene = Scene(contacts).on_cover(skin, cover)
+            scene = Scene(contacts, int(rng.integers(2**63))).on_cover(skin, cover)
             return scene, max(scene.settled_s, float(rng.uniform(0, file.seconds)))
     left, right, top, bottom = (end / M for end in sheet(skin))
     assert file.gap_mm is not None

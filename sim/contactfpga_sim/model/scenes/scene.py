@@ -35,6 +35,8 @@ class Scene:
     beyond one end is also at the other."""
 
     contacts: tuple[Contact, ...]
+    drawn: int = 0
+    """Seed of the closing forces of the sheet that is touched, where a cover spreads them."""
 
     def loads(self, seconds: float) -> list[Load]:
         """Loads on the cover at a time."""
@@ -64,7 +66,8 @@ class Scene:
 
     def approaching(self, speed_mm_s: float) -> Scene:
         """The scene with all bodies touching at 0 s and coming at this speed."""
-        return Scene(tuple(dataclasses.replace(contact, speed_mm_s=speed_mm_s) for contact in self.contacts))
+        coming = tuple(dataclasses.replace(contact, speed_mm_s=speed_mm_s) for contact in self.contacts)
+        return dataclasses.replace(self, contacts=coming)
 
     def pressed(
         self, seconds: float, skin: Skin, cover: Cover | None = None, before: np.ndarray | None = None
@@ -77,7 +80,7 @@ class Scene:
             loads = all_loads(loads, sheet(skin).left, around_m(skin))
         pitch_x, pitch_y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
         if cover is not None and cover.model != "patch":
-            return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y).closed(loads, before)
+            return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y, self.drawn).closed(loads, before)
         return (cover or Cover()).under(
             loads, np.arange(skin.columns) * pitch_x, np.arange(skin.rows)[:, None] * pitch_y
         )
@@ -102,7 +105,8 @@ class Scene:
 
 @functools.lru_cache(maxsize=4096)
 def _on_cover(scene: Scene, pitch_x_mm: float, pitch_y_mm: float, cover: Cover | None) -> Scene:
-    return Scene(tuple(contact.on(cover, pitch_x_mm, pitch_y_mm) for contact in scene.contacts))
+    pressed = tuple(contact.on(cover, pitch_x_mm, pitch_y_mm) for contact in scene.contacts)
+    return dataclasses.replace(scene, contacts=pressed)
 
 
 def sheet(skin: Skin) -> Box:
