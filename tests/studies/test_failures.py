@@ -202,8 +202,8 @@ def two_discs(gap, pitch, structure, rng):
 @pytest.mark.slow
 @pytest.mark.parametrize("diameter", sample([8, 16, 24], quick=[24]))
 def test_no_finger_is_felt_whose_force_closes_no_switch_and_each_that_closes_one(turn, diameter):
-    """No tile takes more than all of the force, and the one under the middle takes at least a quarter of what a flat disc
-    of the finger's greatest size puts on a tile. A dome of 0.4 N differs by 10 % from the next."""
+    """No tile takes more than all of the force, and the one in the middle at least a quarter, or the share that a flat
+    disc of the finger's greatest size puts on it. A dome of 0.4 N differs by 10 % from the next."""
     found = turn("light", f"{diameter} mm")
     share = min(0.25, 6.4**2 / (math.pi * (diameter / 2) ** 2))
     for force, outcome in zip(found.values, found.outcomes, strict=True):
