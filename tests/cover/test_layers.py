@@ -66,7 +66,9 @@ def test_whole_foam_under_a_rigid_body(thickness, radius, poisson):
         assert ball(radius, foam(thickness)).force_n(1e-3 * depth) == pytest.approx(found, rel=0.1), depth
 
 
-@pytest.mark.parametrize(("transfer", "poisson"), [(functools.partial(medium.transfer, "bonded"), 0.4999)])
+@pytest.mark.parametrize(
+    ("transfer", "poisson"), [(functools.partial(medium.transfer, "bonded"), 0.4999), (medium.foam, medium.POISSON)]
+)
 def test_spread_of_a_force_to_the_base(transfer, poisson):
     """Shares of a point force on squares of the base that are two and three thicknesses wide."""
     planes = np.append(np.linspace(0, 1.5, 10), [2, 2.8, 4])

@@ -64,7 +64,6 @@ _ALL = (
         sections=tables(
             "sense",
             closes=Section("caps:felt_table", sample="caps:felt_sample"),
-            elements=Section("caps:elements_table", page="paper.md"),
             sags=Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             paper=Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
             thinning=Section("tables:thinning_table", sample="tables:thinning_table"),
