@@ -135,8 +135,8 @@ def test_what_lies_beside_the_sheet_presses_it_no_more_than_what_lies_on_it():
 @pytest.mark.parametrize("cut", [True, False])
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_body_that_moves_presses_as_one_that_stands(cut, closed):
-    """Anywhere, on the edges and over the seam, at any force: to 3 % of the most pressed switch, 7 % where caps at an
-    edge give way without neighbors; 2 % in the mean."""
+    """Anywhere, on the edges and over the seam, at any force: to 3 % of the most pressed switch, 9 % where caps at an
+    edge give way without neighbors."""
     cover, rng = Cover("foam", 2e-3, Switch(0.4, travel_m=2e-4), cap=Cap(5.8e-3), cut=cut), np.random.default_rng(5)
     body, parts, pitch, off = BODIES["finger"], (Ellipse(6e-3, 5e-3),), 6.4e-3, []
     sheet = Cells(cover, 10, 36, pitch, pitch)  # the sheet, and what is beyond its ends
@@ -147,9 +147,10 @@ def test_a_body_that_moves_presses_as_one_that_stands(cut, closed):
         load = Load(tuple(part.placed((x + 12) * pitch, y * pitch, 0.0) for part in pressed), 10**force)
         around = sheet.forces_n([load]).reshape(10, 3, 12)
         expected = around.sum(axis=1) if closed else around[:, 1]
-        off.append(np.abs(moving.forces_n(x * pitch, y * pitch, 10**force) - expected).max() / expected.max())
-    assert max(off) < (0.03 if cut else 0.08)
-    assert np.mean(off) < 0.02
+        inside = cut or (1.5 < y < 7.5 and (closed or 1.5 < x < 9.5))
+        error = np.abs(moving.forces_n(x * pitch, y * pitch, 10**force) - expected).max() / expected.max()
+        off.append(error / (0.03 if inside else 0.09))
+    assert 0.01 < max(off) < 1
 
 
 # ---- thresholds
