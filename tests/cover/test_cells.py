@@ -1,10 +1,10 @@
-"""Force on the switches under faces and caps: closed forms, a boundary-element solution, and what must only rise."""
+"""Force on the switches under faces and caps: closed forms, finite elements, and what must only rise."""
 
-import itertools
 import math
 
 import numpy as np
 import pytest
+from elements import Block
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special
@@ -24,11 +24,8 @@ from contactfpga.design.cover import (
 )
 from contactfpga.design.cover.moving import MovingBody
 from contactfpga.design.cover.press import read_cover, write_cover
-from contactfpga_sim.lab.cover.elements import FoamOnCaps
 
 PITCH = 10e-3
-PLACES = {"on a cap": (45.0, 45.0), "between two": (40.0, 45.0), "between four": (40.0, 40.0), "aside": (42.0, 43.0)}
-"""In mm from the sheet's corner, for 8x8 caps."""
 
 
 def cells(cover, count=8, pitch=PITCH, seed=0):
@@ -45,19 +42,31 @@ def capped(thickness_mm, side_mm, stiffness=math.inf, proud=True, cut=False):
     return Cover("foam", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud), cut=cut)
 
 
-# ---- against the boundary elements
+# ---- against finite elements
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("thickness", "side"), [*itertools.product((2.0, 5.0), (6.0, 9.0))])
 @pytest.mark.parametrize("stiffness", [math.inf, 2.0])
-def test_proud_caps_carry_all_of_the_foam(thickness, side, stiffness):
-    """The largest force, on which it depends whether a touch is felt, is off by at most an eighth."""
-    foam, sheet = FoamOnCaps(thickness, side, stiffness=stiffness), cells(capped(thickness, side, stiffness))
-    for x, y in PLACES.values():
-        exact, found = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)), sheet.forces_n(finger(x, y))
-        assert found.max() == pytest.approx(exact.max(), rel=0.125)
-        assert found.sum() == pytest.approx(2.0, rel=1e-5)
+@pytest.mark.parametrize("middle", [0, 0.5])
+@pytest.mark.parametrize(("thickness", "side", "pitch"), [(2, 5.8, 6.4), (2, 9, 10), (5, 6, 10)])
+def test_proud_caps_carry_all_of_the_foam(thickness, side, pitch, middle, stiffness):
+    """Foam glued to caps that stand or give way, over one and between four: the largest force, on which it depends
+    whether a touch is felt, is off by at most a tenth."""
+    middles = pitch * (middle + np.arange(3))
+    planes = middles[:, None] + np.append(np.linspace(-side / 2, side / 2, 5), pitch / 2)
+    planes = np.unique(np.maximum(0, np.append(planes, 0)).round(6))
+    on = np.abs(planes[:, None] - middles) < side / 2 + 1e-9
+    caps = np.where(np.outer(on.any(axis=1), on.any(axis=1)), 3 * on.argmax(axis=1)[:, None] + on.argmax(axis=1), -1)
+    foam = Block(planes, planes, np.linspace(0, thickness, 4), medium.POISSON, (True, True), caps.ravel() >= 0)
+    widths = (np.diff(planes, prepend=0) + np.diff(planes, append=planes[-1])) / 2
+    load = np.sqrt(np.maximum(0, 1 - (foam.top_x / 7) ** 2 - (foam.top_y / 6) ** 2)) * np.outer(widths, widths).ravel()
+    parts = np.outer(*[np.where(middles == 0, 0.5, 1)] * 2).ravel()  # of caps that the planes of symmetry cut
+    springs = min(stiffness, 1e6) * parts
+    carried = foam.on_plates(Cover().modulus_pa / 1e6, caps.ravel(), springs, load / load.sum() / 2)
+    sheet = Cells(capped(thickness, side, stiffness), 9, 9, pitch * 1e-3, pitch * 1e-3)
+    place = pitch * (4 - middle) + 5
+    found = sheet.forces_n(finger(place, place))
+    assert found.max() == pytest.approx((carried / parts).max(), rel=0.1)
+    assert found.sum() == pytest.approx(4 * carried.sum(), rel=1e-5)
 
 
 # ---- against closed forms
@@ -126,8 +135,8 @@ def test_what_lies_beside_the_sheet_presses_it_no_more_than_what_lies_on_it():
 @pytest.mark.parametrize("cut", [True, False])
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_body_that_moves_presses_as_one_that_stands(cut, closed):
-    """Anywhere, on the edges and over the seam, at any force: to 3 % of the most pressed switch, 7 % where caps at an
-    edge give way without neighbors; 2 % in the mean."""
+    """Anywhere, on the edges and over the seam, at any force: to 3 % of the most pressed switch, 9 % where caps at an
+    edge give way without neighbors."""
     cover, rng = Cover("foam", 2e-3, Switch(0.4, travel_m=2e-4), cap=Cap(5.8e-3), cut=cut), np.random.default_rng(5)
     body, parts, pitch, off = BODIES["finger"], (Ellipse(6e-3, 5e-3),), 6.4e-3, []
     sheet = Cells(cover, 10, 36, pitch, pitch)  # the sheet, and what is beyond its ends
@@ -138,9 +147,10 @@ def test_a_body_that_moves_presses_as_one_that_stands(cut, closed):
         load = Load(tuple(part.placed((x + 12) * pitch, y * pitch, 0.0) for part in pressed), 10**force)
         around = sheet.forces_n([load]).reshape(10, 3, 12)
         expected = around.sum(axis=1) if closed else around[:, 1]
-        off.append(np.abs(moving.forces_n(x * pitch, y * pitch, 10**force) - expected).max() / expected.max())
-    assert max(off) < (0.03 if cut else 0.08)
-    assert np.mean(off) < 0.02
+        inside = cut or (1.5 < y < 7.5 and (closed or 1.5 < x < 9.5))
+        error = np.abs(moving.forces_n(x * pitch, y * pitch, 10**force) - expected).max() / expected.max()
+        off.append(error / (0.03 if inside else 0.09))
+    assert 0.01 < max(off) < 1
 
 
 # ---- thresholds

@@ -43,14 +43,20 @@ def bricks(edges, poisson):
     return found * edges.prod(axis=1)[:, None, None] / 8
 
 
+def solved(stiffness, loads):
+    """Displacements under loads."""
+    return splu(sparse.csc_array(stiffness), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(loads)
+
+
 class Block:
     """A block bonded to a rigid base, free at its sides and without friction on top.
 
     ``x``, ``y``, ``z``: the planes of its nodes; z runs from the base up. ``mirrored``: whether the first plane of x
-    and that of y are planes of symmetry, so that it is a half or a quarter of a block.
+    and that of y are planes of symmetry, so that it is a half or a quarter of a block. ``held``: which nodes of the
+    bottom are on the base.
     """
 
-    def __init__(self, x, y, z, poisson, mirrored=(False, False)):
+    def __init__(self, x, y, z, poisson, mirrored=(False, False), held=slice(None)):
         index = np.arange(len(x) * len(y) * len(z)).reshape(len(x), len(y), len(z))
         self.base, self.top = index[..., 0].ravel(), index[..., -1].ravel()
         self.top_x, self.top_y = (plane.ravel() for plane in np.meshgrid(x, y, indexing="ij"))
@@ -62,7 +68,7 @@ class Block:
         self._edges = np.stack([edge.ravel() for edge in edges], axis=1)
         self._bricks = bricks(self._edges, poisson)
         free = np.ones((index.size, 3), bool)
-        free[self.base] = False
+        free[self.base[held]] = False
         free[index[0] if mirrored[0] else [], 0] = False
         free[index[:, 0] if mirrored[1] else [], 1] = False
         self._free = np.flatnonzero(free)
@@ -81,7 +87,7 @@ class Block:
         loads = np.zeros((len(self._free), len(loaded)))
         loads[loaded, np.arange(len(loaded))] = 1
         found = np.zeros((3 * (self._nodes.max() + 1), len(loaded)))
-        found[self._free] = splu(stiffness, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(loads)
+        found[self._free] = solved(stiffness, loads)
         return found.reshape(-1, 3, len(loaded))
 
     def pressed(self, modulus, gap):
@@ -103,6 +109,21 @@ class Block:
         """Forces on the nodes of the base under 1 N on node ``at`` of the top."""
         moved = self.moved(1.0, [at])
         return -(self._stiffness(1.0) @ moved.ravel()).reshape(-1, 3)[self.base, 2]
+
+    def on_plates(self, modulus, plates, stiffness, load):
+        """(plates,) forces on rigid plates that carry the bottom and move up and down alone, each on a spring of
+        ``stiffness`` in N/mm, under the forces ``load`` on the nodes of the top.
+
+        ``plates``: the plate of each node of the bottom, -1 for none.
+        """
+        on, count = np.flatnonzero(plates >= 0), len(self._free)
+        places = np.append(self._free, 3 * self.base[on] + 2), np.append(np.arange(count), count + plates[on])
+        loads = np.zeros(3 * (self._nodes.max() + 1))
+        loads[3 * self.top + 2] = load
+        tied = sparse.csc_array((np.ones(count + len(on)), places), shape=(len(loads), count + len(stiffness)))
+        springs = sparse.diags_array(np.append(np.zeros(count), stiffness))
+        moved = solved(tied.T @ self._stiffness(modulus) @ tied + springs, tied.T @ loads)
+        return moved[count:] * stiffness
 
 
 def touching(compliance, gap):

@@ -64,7 +64,8 @@ _ALL = (
         sections=tables(
             "sense",
             closes=Section("caps:felt_table", sample="caps:felt_sample"),
-            elements=Section("caps:elements_table", page="paper.md"),
+            bodies=Section("tables:body_table", sample="tables:body_table"),
+            fingertip=Section("tables:fingertip_table", sample="tables:fingertip_table"),
             sags=Section("caps:sagging_table", page="paper.md", sample="caps:sagging_table"),
             paper=Section("tables:paper_table", page="paper.md", sample="tables:paper_table"),
             thinning=Section("tables:thinning_table", sample="tables:thinning_table"),
