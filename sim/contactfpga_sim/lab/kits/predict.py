@@ -268,7 +268,7 @@ def drawn_factors(rng: np.random.Generator) -> dict[str, float]:
 MEASURED = {
     **{
         f"closing_{number}_n": (
-            f"force of {FINGER}, {x:g} and {y:g} pitches from a switch's middle, when it is felt",
+            f"force of {FINGER}, long along the rows, {x:g} and {y:g} pitches off a switch's middle, when it is felt",
             "N",
         )
         for number, (x, y) in enumerate(PLACES)
@@ -278,10 +278,10 @@ MEASURED = {
     "felt_most_n": (f"force from which 99 % of all touches by {FINGER} are felt, anywhere", "N"),
     "felt_share": (f"touches of {PRESSED_N:g} N by {FINGER} that are felt, at those nine places", "%"),
     "first_closing_ms": (
-        f"{FINGER} that comes at {SPEED_MM_S:g} mm/s touches the foam on a switch until it is felt",
+        f"time from the first touch of the foam, on a switch, by {FINGER} at {SPEED_MM_S:g} mm/s until it is felt",
         "ms",
     ),
-    "finger_mm": (f"way that {FINGER} comes from the foam's touch to {PRESSED_N:g} N", "mm"),
+    "finger_mm": (f"way of {FINGER} from its first touch of the foam to {PRESSED_N:g} N", "mm"),
     "plate_mm": (f"depth to which {PLATE_N:g} N press a rigid plate of {PLATE_MM:g} x {PLATE_MM:g} mm", "mm"),
 }
 """Sentence and unit of what a builder can measure of a cover."""

@@ -24,6 +24,7 @@ from contactfpga_sim.apps.latency.spread import Spread
 from contactfpga_sim.apps.latency.stages import Finger
 from contactfpga_sim.apps.latency.usb import BridgeSettings
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.kits import predict
 
 NAMES = ("starter", "fast")
 SEEDS = (1, 2, 3)
@@ -190,7 +191,15 @@ def parts_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
 
 
-PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n")
+PREDICTED = (
+    "contact_worst_us",
+    "break_worst_us",
+    "settle_us",
+    "felt_half_n",
+    "closing_rod_n",
+    "first_closing_ms",
+    "plate_mm",
+)
 """Predictions that the page shows."""
 
 
@@ -203,6 +212,15 @@ def predictions_table() -> writer.Table:
         lines.append((f"`{key}`", any_one.what, any_one.unit, *cells))
     head = ("name", "what", "unit", *NAMES)
     return writer.Table(head, lines, lambda row: row[0].strip("`") in PREDICTED, head[1:])
+
+
+def tolerances_table() -> writer.Table:
+    rows = [
+        (one.what, f"{one.low:.2g} to {one.high:.2g}", one.source)
+        for one in (*predict.COVER.values(), *predict.CIRCUIT.values())
+    ]
+    shown = [one.what for one in predict.COVER.values()]
+    return writer.Table(("times the stated value", "factor", "source"), rows, lambda row: row[0] in shown)
 
 
 def _interval(one: predictions.Prediction) -> str:
