@@ -13,7 +13,6 @@ from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, dra
 from contactfpga import Skin
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import Circuit, fitted, load_circuit
-from contactfpga.design.cover.fitted import fit_force
 from contactfpga.design.predictions import Prediction
 from contactfpga.instruments.settling import Slow
 from contactfpga.tools.commands import bringup
@@ -243,20 +242,16 @@ class PlantedCover:
 
 @pytest.mark.slow  # 200 sheets at nine places
 def test_200_planted_covers_are_as_predicted():
-    """The intervals of the starter kit hold on 93 to 97 %, each on 90 or more, and so do those of the fitted force."""
-    predicted, held, fits = predictions.load(kits.kit("starter")), [], 0
+    """The intervals of the starter kit hold on 93 to 97 %, each on 90 or more."""
+    predicted, held = predictions.load(kits.kit("starter")), []
     for seed in range(SHEETS):
         cover = PlantedCover(np.random.default_rng([seed, 51]))
         grades = report.graded(predicted, cover.measured())
         held.append([one.holds for one in grades])
         assert len(grades) == 13
-        rods = [(0.4, force) for force in cover.closing[4, :9]]
-        fitted_force = fit_force(0.4, rods)
-        fits += fitted_force.low <= cover.force <= fitted_force.high
     shares = dict(zip((one.prediction.name for one in grades), np.mean(held, axis=0), strict=True))
     assert min(shares.values()) >= 0.9, shares
     assert 0.93 <= np.mean(held) <= 0.97, shares
-    assert 0.93 <= fits / SHEETS <= 0.97
 
 
 # ---- the command

@@ -116,7 +116,7 @@ _ALL = (
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
-        minutes=6,
+        minutes=3.2,
         sections=tables(
             "times built",
             kits=Section("tables:headline", page="../README.md"),

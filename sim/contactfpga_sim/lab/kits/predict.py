@@ -12,13 +12,14 @@ import datetime
 import math
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed_by
+from contactfpga.design.circuit import Circuit, load_circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel, spread_evenly
@@ -108,12 +109,21 @@ def predicted(kit: Kit) -> dict[str, Prediction]:
     return {one.name: one for one in found}
 
 
-def _made(name: str, what: str, unit: str, values: Sequence[float], model: str, command: str) -> Prediction:
+UNITS = {"v": "V", "ma": "mA", "n": "N", "share": "%", "s": "1/s"}
+"""Units by the end of a prediction's name, where they differ."""
+
+
+def _unit(name: str) -> str:
+    end = name.rpartition("_")[2]
+    return UNITS.get(end, end)
+
+
+def _made(name: str, what: str, values: Sequence[float], model: str, command: str) -> Prediction:
     """The first value to five digits, with the interval of the others, widened to hold it."""
     low, high = np.quantile(values[1:] or values, [0.025, 0.975])
     value, low, high = (float(f"{one:.5g}") for one in (values[0], min(low, values[0]), max(high, values[0])))
     today = datetime.date.today()
-    return Prediction(name, what, unit, value, low, high, model, command, today, _commit())
+    return Prediction(name, what, _unit(name), value, low, high, model, command, today, _commit())
 
 
 def _commit() -> str:
@@ -143,15 +153,13 @@ def _times(kit: Kit) -> Iterator[Prediction]:
             values = [times.quantile(share), *(times.quantile(one) for one in shares)]
             near = [values[0] * (1 - CRYSTAL), values[0] * (1 + CRYSTAL)]
             said = f"{what}, {statistic} of {TOUCHES} {tries}"
-            yield _made(f"{name}_{statistic}_us", said, "us", values + near, model, by)
+            yield _made(f"{name}_{statistic}_us", said, values + near, model, by)
     rate = board.frames_per_s
-    yield _made(
-        "frames_per_s", "frames while a contact moves", "1/s", [rate, 0.99 * rate, 1.01 * rate], "gateware", command
-    )
-    yield _made("frame_bytes", "bytes of a frame with one contact", "bytes", [board.bytes], "gateware", command)
+    yield _made("frames_per_s", "frames while a contact moves", [rate, 0.99 * rate, 1.01 * rate], "gateware", command)
+    yield _made("frame_bytes", "bytes of a frame with one contact", [board.bytes], "gateware", command)
     edges = [1.0, 1 - CRYSTAL, 1 + CRYSTAL]
     yield _made(
-        "alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"contactfpga build --kit {kit.name}"
+        "alive_ms", "time between two edges of `alive`", edges, "gateware", f"contactfpga build --kit {kit.name}"
     )
 
 
@@ -190,39 +198,34 @@ def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
     return circuit.replace(diode=dataclasses.replace(circuit.diode, **diode), **values)
 
 
+NEEDED = {
+    "settle_us": ("a row selected until the slowest column reads right", "settle.seconds"),
+    "precharge_us": ("columns driven until they are charged", "precharge.seconds"),
+    "pulled_release_us": ("pull-ups alone lift the columns after a pressed row", "pulled_release.seconds"),
+    "pressed_v": ("a pressed column while its whole row is pressed", "pressed.level_v"),
+    "unpressed_v": ("a column that neighbors pull after a precharge", "unpressed_v"),
+    "row_ma": ("the pin of a row whose switches are all pressed", "pressed.pin_ma"),
+    "row_peak_ma": ("the pin of a row while lines are charged", "row_peak_ma"),
+    "column_peak_ma": ("the pin of a column while it is charged", "column_peak_ma"),
+}
+PROJECTED = {
+    "project_us": ("rows let go until all read right", "project.seconds"),
+    "touched_v": ("a touched row while one column feeds all rows", "touched.level_v"),
+    "feeding_ma": ("the pin of a column that feeds all rows", "touched.pin_ma"),
+}
+"""Sentence and value of what :class:`~contactfpga.design.circuit.Needs` tell, the latter of a scan that reads rows."""
+
+
 def _circuit(kit: Kit) -> Iterator[Prediction]:
     skin, stated = kit.skin, load_circuit(kit.skin_path)
     nominal = extracted(lay_out(skin, stated)).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
     needs = [needed_by(skin, one) for one in drawn]
-    values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
-        "settle_us": (
-            "a row selected until the slowest column reads right",
-            "us",
-            lambda one: 1e6 * one.settle.seconds,
-        ),
-        "precharge_us": ("columns driven until they are charged", "us", lambda one: 1e6 * one.precharge.seconds),
-        "pulled_release_us": (
-            "pull-ups alone lift the columns after a pressed row",
-            "us",
-            lambda one: 1e6 * one.pulled_release.seconds,
-        ),
-        "pressed_v": ("a pressed column while its whole row is pressed", "V", lambda one: one.pressed.level_v),
-        "unpressed_v": ("a column that neighbors pull after a precharge", "V", lambda one: one.unpressed_v),
-        "row_ma": ("the pin of a row whose switches are all pressed", "mA", lambda one: one.pressed.pin_ma),
-        "row_peak_ma": ("the pin of a row while lines are charged", "mA", lambda one: one.row_peak_ma),
-        "column_peak_ma": ("the pin of a column while it is charged", "mA", lambda one: one.column_peak_ma),
-    }
-    if skin.reads_rows:
-        values |= {
-            "project_us": ("rows let go until all read right", "us", lambda one: 1e6 * one.project.seconds),
-            "touched_v": ("a touched row while one column feeds all rows", "V", lambda one: one.touched.level_v),
-            "feeding_ma": ("the pin of a column that feeds all rows", "mA", lambda one: one.touched.pin_ma),
-        }
     command = f"contactfpga settle --kit {kit.name} --margin 1"
-    for name, (what, unit, of) in values.items():
-        yield _made(name, what, unit, [of(one) for one in needs], "circuit", command)
+    for name, (what, value) in (NEEDED | (PROJECTED if skin.reads_rows else {})).items():
+        found = [float(attrgetter(value)(one)) for one in needs]
+        yield _made(name, what, [1e6 * one for one in found] if _unit(name) == "us" else found, "circuit", command)
 
 
 class Pressing(NamedTuple):
@@ -239,25 +242,20 @@ def pressing(cover: Cover, factors: Mapping[str, float]) -> Pressing:
 
     The keys are those of :data:`COVER`, and ``spread``; ``tilt`` is a standard deviation, such as :data:`TILT`.
     """
-    of = dict.fromkeys([*COVER, "spread"], 1.0) | {"tilt": 0.0} | factors
+    of = {**dict.fromkeys([*COVER, "spread"], 1.0), "tilt": 0.0, **factors}
     switch = dataclasses.replace(
         cover.switch,
         force_n=cover.switch.force_n * of["force"],
         travel_m=cover.switch.travel_m * of["travel"],
         spread=math.hypot(cover.switch.spread * of["spread"], of["tilt"]),
     )
+    flesh = BODY.flesh and BODY.flesh._replace(modulus_pa=BODY.flesh.modulus_pa * of["flesh"])
     modulus, thickness = cover.modulus_pa * of["foam"] * of["curve"], cover.thickness_m * of["thickness"]
     return Pressing(
         dataclasses.replace(cover, switch=switch, modulus_pa=modulus, thickness_m=thickness),
         Ellipse(LENGTH_M / 2 * of["patch"], WIDTH_M / 2 * of["patch"]),
-        softened(BODY, of["flesh"])._replace(depth_m=BODY.depth_m * of["depth"]),
+        BODY._replace(depth_m=BODY.depth_m * of["depth"], flesh=flesh),
     )
-
-
-def softened(body: Body, factor: float) -> Body:
-    """A body whose flesh, if any, has its modulus times a factor."""
-    flesh = body.flesh and body.flesh._replace(modulus_pa=body.flesh.modulus_pa * factor)
-    return body._replace(flesh=flesh)
 
 
 def drawn_factors(rng: np.random.Generator) -> dict[str, float]:
@@ -268,23 +266,21 @@ def drawn_factors(rng: np.random.Generator) -> dict[str, float]:
 MEASURED = {
     **{
         f"closing_{number}_n": (
-            f"force of {FINGER}, long along the rows, {x:g} and {y:g} pitches off a switch's middle, when it is felt",
-            "N",
+            f"force of {FINGER}, long along the rows, {x:g} and {y:g} pitches off a switch's middle, when it is felt"
         )
         for number, (x, y) in enumerate(PLACES)
     },
-    "closing_rod_n": (f"force of a rigid rod of {ROD_MM:g} mm on a cap's middle when it is felt", "N"),
-    "felt_half_n": (f"force from which half of all touches by {FINGER} are felt, anywhere", "N"),
-    "felt_most_n": (f"force from which 99 % of all touches by {FINGER} are felt, anywhere", "N"),
-    "felt_share": (f"touches of {PRESSED_N:g} N by {FINGER} that are felt, at those nine places", "%"),
+    "closing_rod_n": f"force of a rigid rod of {ROD_MM:g} mm on a cap's middle when it is felt",
+    "felt_half_n": f"force from which half of all touches by {FINGER} are felt, anywhere",
+    "felt_most_n": f"force from which 99 % of all touches by {FINGER} are felt, anywhere",
+    "felt_share": f"touches of {PRESSED_N:g} N by {FINGER} that are felt, at those nine places",
     "first_closing_ms": (
-        f"time from the first touch of the foam, on a switch, by {FINGER} at {SPEED_MM_S:g} mm/s until it is felt",
-        "ms",
+        f"time from the first touch of the foam, on a switch, by {FINGER} at {SPEED_MM_S:g} mm/s until it is felt"
     ),
-    "finger_mm": (f"way of {FINGER} from its first touch of the foam to {PRESSED_N:g} N", "mm"),
-    "plate_mm": (f"depth to which {PLATE_N:g} N press a rigid plate of {PLATE_MM:g} x {PLATE_MM:g} mm", "mm"),
+    "finger_mm": f"way of {FINGER} from its first touch of the foam to {PRESSED_N:g} N",
+    "plate_mm": f"depth to which {PLATE_N:g} N press a rigid plate of {PLATE_MM:g} x {PLATE_MM:g} mm",
 }
-"""Sentence and unit of what a builder can measure of a cover."""
+"""What a builder can measure of a cover."""
 
 
 def _cover(kit: Kit) -> Iterator[Prediction]:
@@ -293,11 +289,11 @@ def _cover(kit: Kit) -> Iterator[Prediction]:
     rng = np.random.default_rng(2)
     drawn = [measured(pressing(stated, drawn_factors(rng)), kit.skin, seed) for seed in range(DRAWS)]
     usual = measured(pressing(stated, {"spread": 0.0}), kit.skin, 0) | _felt(stated, kit.skin)
-    for name, (what, unit) in MEASURED.items():
+    for name, what in MEASURED.items():
         command = f"contactfpga cover felt --kit {kit.name}"
         if not name.startswith("felt_"):
             command = f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
-        yield _made(name, what, unit, [one[name] for one in (usual, *drawn)], "cover", command)
+        yield _made(name, what, [one[name] for one in (usual, *drawn)], "cover", command)
 
 
 def _felt(cover: Cover, skin: Skin) -> dict[str, float]:

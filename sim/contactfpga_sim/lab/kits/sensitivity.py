@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
@@ -11,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design import kits
-from contactfpga.design.cover import load_cover
-from contactfpga.design.cover.felt import Force, feel
-from contactfpga.design.cover.layers import BODIES
+from contactfpga.design.cover import Body, Cover, load_cover
 from contactfpga.design.cover.numerics import Floats
 from contactfpga_sim.apps import errors, pool
 from contactfpga_sim.lab import writer
@@ -21,17 +18,16 @@ from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.chart import methods
 from contactfpga_sim.lab.kits import predict
-from contactfpga_sim.model.scenes.contacts import Contact
 from contactfpga_sim.model.scenes.families import placements
 
-KIT = "starter"
-PLACES, TOUCHES, SCENES = 500, 24, 1000
-"""Places of a finger, touches of an arm and scenes of fingers, the same for each assumption."""
+KIT = kits.kit("starter")
+TOUCHES, SCENES = 16, 500
+"""Touches of an arm and scenes of fingers, the same for each assumption."""
 LATE_US = 100.0
 
 CHANGES: dict[str, tuple[dict[str, float], ...]] = {
-    "flesh of finger and forearm half / twice as stiff": ({"flesh": 0.5}, {"flesh": 2.0}),
-    "finger and arm 25 % narrower / wider": ({"patch": 0.75}, {"patch": 1.25}),
+    "flesh of fingers half / twice as stiff": ({"flesh": 0.5}, {"flesh": 2.0}),
+    "fingers and arm 25 % narrower / wider": ({"patch": 0.75}, {"patch": 1.25}),
     "foam half / twice as stiff": ({"foam": 0.5}, {"foam": 2.0}),
     "foam 10 % thinner / thicker": ({"thickness": 0.9}, {"thickness": 1.1}),
     "domes 10 % weaker / stronger": ({"force": 0.9}, {"force": 1.1}),
@@ -39,7 +35,7 @@ CHANGES: dict[str, tuple[dict[str, float], ...]] = {
     "caps tilt: each closes within 4 %": ({"tilt": predict.TILT},),
     f"electronics {LATE_US:g} us later": ({"late_us": LATE_US},),
 }
-"""Factors of :func:`contactfpga_sim.lab.kits.predict.pressing`, and a delay."""
+"""Factors of :func:`contactfpga_sim.lab.kits.predict.pressing`, or a delay."""
 
 
 class Headlines(NamedTuple):
@@ -47,8 +43,8 @@ class Headlines(NamedTuple):
 
     felt_n: float
     """Force from which half of all fingers are felt, anywhere."""
-    decided_ms: float
-    """Time from a finger's first touch of the foam until half of them are felt, and the controller knows."""
+    told_ms: float
+    """Time from a finger's first touch of the foam, on a switch, to the controller's input."""
     rigid_n: float
     """Mean peak force of an arm that runs into a rigid one by UART, anywhere."""
     forearm_n: float
@@ -57,57 +53,36 @@ class Headlines(NamedTuple):
 
 
 def headlines(changes: Mapping[str, float], touches: int = TOUCHES, scenes: int = SCENES) -> Headlines:
-    """What the kit comes to with one of :data:`CHANGES`, or without."""
-    kit, paper, of = kits.kit(KIT), Case.load("paper"), {"flesh": 1.0, "patch": 1.0, "late_us": 0.0} | changes
-    stated = load_cover(kit.skin_path)
+    """What the kit comes to with one of :data:`CHANGES`, or as stated."""
+    of = {"patch": 1.0, "late_us": 0.0, **changes}
+    late_s, stated = 1e-6 * of.pop("late_us"), load_cover(KIT.skin_path)
     assert stated is not None
-    assert stated.cap is not None
-    late_s = 1e-6 * of.pop("late_us")
-    latencies = tuple(one + late_s for one in places.measured_s(paper, kit.skin, "uart"))
-    (cover, finger, body), sheet = predict.pressing(stated, of), predict.sheet(kit.skin)
-    half = feel(cover, sheet, 2 * finger.half_x_m, 2 * finger.half_y_m, PLACES, body=body).half
-    assert isinstance(half, Force)
-    depth_m = cover.indentation([finger], body, sheet.pitch_x_m, sheet.pitch_y_m).depth_m(half.value_n)
+    one = predict.pressing(stated, of)
+    found = predict.measured(one, KIT.skin, 0)
+    latencies = tuple(late_s + each for each in places.measured_s(Case.load("paper"), KIT.skin, "uart"))
+    rigid_n, forearm_n = (_peak_n(one.cover, body, of["patch"], latencies, touches) for body in ("rigid", "forearm"))
+    told_ms = found["first_closing_ms"] + 1e3 * float(np.median(latencies))
+    wide = one.body._replace(depth_m=one.body.depth_m / of["patch"] ** 2)  # the same curvature as of a wider patch
+    wrong = np.fromiter(_miscounted(one.cover, wide, scenes), float)
+    return Headlines(found["felt_half_n"], told_ms, rigid_n, forearm_n, wrong)
+
+
+def _peak_n(cover: Cover, body: str, wide: float, latencies: places.Latencies, touches: int) -> float:
+    paper = Case.load("paper")
     foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
-    arm = paper.but(
-        model="foam",
-        foam=foam | {"radius_m": paper.foam.radius_m * of["patch"]},
-        switch=dataclasses.asdict(cover.switch),
-        cap=dataclasses.asdict(stated.cap),
-    )
-    skin = methods.sheet(kit.skin.pitch_x_mm)
-    with _softened(of["flesh"]) as ending:
-        peaks = []
-        for name in ("rigid", "forearm"):
-            batches = places.batches(arm.but(body=name + ending), kit.skin, (latencies,), touches)
-            peaks.append(float(np.mean([force for batch in batches for force, *_ in places.work(batch)[0]])))
-        wrong = []
-        for scene in placements("fingers", scenes, 0, skin):
-            changed = tuple(_changed(contact, of["patch"], ending) for contact in scene.contacts)
-            cells, there = errors.look(dataclasses.replace(scene, contacts=changed), 0.0, skin, cover)
-            wrong.append(errors.errors(errors.method_zones(cells, skin), there).miscounted)
-    decided_ms = 1e6 * depth_m / predict.SPEED_MM_S + 1e3 * float(np.median(latencies))
-    return Headlines(half.value_n, decided_ms, *peaks, np.array(wrong, float))
+    foam["radius_m"] = paper.foam.radius_m * wide
+    switch, cap = dataclasses.asdict(cover.switch), dataclasses.asdict(cover)["cap"]
+    case = paper.but(model="foam", body=body, foam=foam, switch=switch, cap=cap)
+    batches = places.batches(case, KIT.skin, (latencies,), touches)
+    return float(np.mean([force for batch in batches for force, *_ in places.work(batch)[0]]))
 
 
-@contextlib.contextmanager
-def _softened(factor: float) -> Iterator[str]:
-    """Bodies whose flesh has its modulus times a factor, known for a while by their names with this ending."""
-    ending = f", flesh times {factor:g}"
-    others = {name + ending: predict.softened(body, factor) for name, body in BODIES.items()}
-    BODIES.update(others)
-    try:
-        yield ending
-    finally:
-        for name in others:
-            del BODIES[name]
-
-
-def _changed(contact: Contact, wide: float, ending: str) -> Contact:
-    shape = contact.shape
-    assert isinstance(shape, tuple)
-    parts = (dataclasses.replace(one, half_x_m=one.half_x_m * wide, half_y_m=one.half_y_m * wide) for one in shape)
-    return dataclasses.replace(contact, shape=tuple(parts), body=f"{contact.body}{ending}")
+def _miscounted(cover: Cover, body: Body, count: int) -> Iterator[bool]:
+    skin = methods.sheet(KIT.skin.pitch_x_mm)
+    for scene in placements("fingers", count, 0, skin):
+        contacts = tuple(dataclasses.replace(one, body=body) for one in scene.contacts)
+        cells, there = errors.look(dataclasses.replace(scene, contacts=contacts), 0.0, skin, cover)
+        yield errors.errors(errors.method_zones(cells, skin), there).miscounted
 
 
 HEAD = (
@@ -116,23 +91,20 @@ HEAD = (
     f"foam touched at {predict.SPEED_MM_S:g} mm/s to the controller",
     "arm's mean peak force, rigid",
     "the same, forearm",
-    f"fingers miscounted, {SCENES:,} scenes",
+    f"fingers miscounted, {SCENES} scenes",
 )
 
 
 def sensitivity_table() -> writer.Table:
     with pool.executor() as workers:
-        usual, *others = workers.map(headlines, [{}, *(change for both in CHANGES.values() for change in both)])
-    rows, left = [("as stated", *_stated(usual))], iter(others)
+        usual, *others = workers.map(headlines, [{}, *(one for both in CHANGES.values() for one in both)])
+    newtons = (f"{force:.3g} N" for force in (usual.rigid_n, usual.forearm_n))
+    share = f"{100 * usual.wrong.mean():.1f} %"
+    rows, left = [("as stated", f"{usual.felt_n:.2g} N", f"{usual.told_ms:.3g} ms", *newtons, share)], iter(others)
     for name, changes in CHANGES.items():
         cells = [_moved(next(left), usual) for _ in changes]
-        rows.append((name, *(" / ".join(cell) for cell in zip(*cells, strict=True))))
+        rows.append((name, *map(" / ".join, zip(*cells, strict=True))))
     return writer.Table(HEAD, rows)
-
-
-def _stated(one: Headlines) -> list[str]:
-    newtons = (f"{force:.3g} N" for force in (one.rigid_n, one.forearm_n))
-    return [f"{one.felt_n:.2g} N", f"{one.decided_ms:.3g} ms", *newtons, f"{100 * one.wrong.mean():.1f} %"]
 
 
 def _moved(one: Headlines, usual: Headlines) -> list[str]:

@@ -191,15 +191,7 @@ def parts_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
 
 
-PREDICTED = (
-    "contact_worst_us",
-    "break_worst_us",
-    "settle_us",
-    "felt_half_n",
-    "closing_rod_n",
-    "first_closing_ms",
-    "plate_mm",
-)
+PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
 """Predictions that the page shows."""
 
 
