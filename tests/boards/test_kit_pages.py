@@ -19,7 +19,7 @@ from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
-from contactfpga_sim.lab.kits import predict
+from contactfpga_sim.lab.kits import predict, sensitivity
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 ONE = Prediction(
@@ -109,6 +109,15 @@ def test_each_assumption_of_the_circuit_moves_a_prediction(key, monkeypatch):
     monkeypatch.setattr(predict, "DRAWS", 1)
     found = [*predict._circuit(kits.kit("fast"))]
     assert max(each.high / each.low for each in found) > 1.001
+
+
+@pytest.mark.slow
+def test_each_change_of_the_page_moves_a_headline():
+    usual = sensitivity.headlines({}, touches=2, scenes=10)
+    for change in (one for both in sensitivity.CHANGES.values() for one in both):
+        moved = sensitivity.headlines(change, touches=2, scenes=10)
+        least = 1e-3 if "tilt" in change else 5e-3
+        assert max(abs(now / before - 1) for now, before in zip(moved[:4], usual[:4], strict=True)) > least, change
 
 
 def test_a_changed_prediction_is_a_new_entry_that_counts_and_no_edit(tmp_path):

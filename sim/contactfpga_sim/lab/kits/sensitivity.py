@@ -100,15 +100,17 @@ def sensitivity_table() -> writer.Table:
         usual, *others = workers.map(headlines, [{}, *(one for both in CHANGES.values() for one in both)])
     newtons = (f"{force:.3g} N" for force in (usual.rigid_n, usual.forearm_n))
     share = f"{100 * usual.wrong.mean():.1f} %"
-    rows, left = [("as stated", f"{usual.felt_n:.2g} N", f"{usual.told_ms:.3g} ms", *newtons, share)], iter(others)
+    stated = (f"{usual.felt_n:.2g} N", f"{usual.told_ms:.3g} ms", *newtons, share)
+    rows, left = [], iter(others)
     for name, changes in CHANGES.items():
         cells = [_moved(next(left), usual) for _ in changes]
         rows.append((name, *map(" / ".join, zip(*cells, strict=True))))
-    return writer.Table(HEAD, rows)
+    before = "; ".join(f"{name} {value}" for name, value in zip(HEAD[1:], stated, strict=True))
+    return writer.Table(HEAD, rows, before=f"As stated: {before}.")
 
 
 def _moved(one: Headlines, usual: Headlines) -> list[str]:
     """Relative changes, and the difference of the shares with its 95 % interval, in points."""
-    moved = [f"{100 * (now / before - 1):+.0f} %" for now, before in zip(one[:-1], usual[:-1], strict=True)]
+    moved = [f"{100 * (now / before - 1):+z.0f} %" for now, before in zip(one[:-1], usual[:-1], strict=True)]
     more = 100 * (one.wrong - usual.wrong)
-    return [*moved, f"{more.mean():+.1f} ± {1.96 * more.std() / math.sqrt(len(more)):.1f}"]
+    return [*moved, f"{more.mean():+z.1f} ± {1.96 * more.std() / math.sqrt(len(more)):.1f}"]

@@ -206,13 +206,17 @@ def predictions_table() -> writer.Table:
     return writer.Table(head, lines, lambda row: row[0].strip("`") in PREDICTED, head[1:])
 
 
+WIDE = 0.9
+"""Lowest factor of tolerances that the page does not show."""
+
+
 def tolerances_table() -> writer.Table:
     rows = [
         (one.what, f"{one.low:.2g} to {one.high:.2g}", one.source)
         for one in (*predict.COVER.values(), *predict.CIRCUIT.values())
     ]
-    shown = [one.what for one in predict.COVER.values()]
-    return writer.Table(("times the stated value", "factor", "source"), rows, lambda row: row[0] in shown)
+    wide = [one.what for one in predict.COVER.values() if one.low < WIDE]
+    return writer.Table(("times the stated value", "factor", "source"), rows, lambda row: row[0] in wide)
 
 
 def _interval(one: predictions.Prediction) -> str:
