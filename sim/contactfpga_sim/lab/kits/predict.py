@@ -87,7 +87,10 @@ CIRCUIT = {
 }
 COVER = {
     "flesh": Tolerance(
-        "stiffness of the finger's flesh", 0.6, 1.7, "0.07 to 0.2 MPa, 'Young's modulus for the fingers', 0.5 to 10 N"
+        "stiffness of the finger's flesh",
+        0.6,
+        1.7,
+        "0.07 to 0.2 MPa by 'Experimental determination of the Young's modulus for the fingers'",
     ),
     "patch": Tolerance("length and width of the finger's contact", 0.75, 1.25, "assumed: 9 to 15 mm long"),
     "depth": Tolerance("depth at which the finger has this contact", 0.75, 1.25),
@@ -104,7 +107,7 @@ TILT = (COVER["tilt"].high - COVER["tilt"].low) / math.sqrt(12)
 
 
 def predicted(kit: Kit) -> dict[str, Prediction]:
-    """All predictions of a kit by name; takes a minute or two."""
+    """All predictions of a kit by name; takes some six minutes, most of them for circuits."""
     found = [*_times(kit), *_circuit(kit), *_cover(kit)]
     return {one.name: one for one in found}
 

@@ -212,7 +212,7 @@ WIDE = 0.9
 
 def tolerances_table() -> writer.Table:
     rows = [
-        (one.what, f"{one.low:.2g} to {one.high:.2g}", one.source)
+        (one.what, f"{one.low:.3g} to {one.high:.3g}", one.source)
         for one in (*predict.COVER.values(), *predict.CIRCUIT.values())
     ]
     wide = [one.what for one in predict.COVER.values() if one.low < WIDE]
