@@ -26,7 +26,7 @@ from contactfpga_sim.apps.latency.stages import Finger
 from contactfpga_sim.apps.latency.usb import BridgeSettings
 from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.kits import counts
+from contactfpga_sim.lab.kits import counts, predict
 from contactfpga_sim.lab.kits.counts import Drawn
 
 NAMES = ("starter", "fast")
@@ -205,7 +205,7 @@ def parts_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
 
 
-PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n")
+PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
 """Predictions that the page shows."""
 
 
@@ -218,6 +218,19 @@ def predictions_table() -> writer.Table:
         lines.append((f"`{key}`", any_one.what, any_one.unit, *cells))
     head = ("name", "what", "unit", *NAMES)
     return writer.Table(head, lines, lambda row: row[0].strip("`") in PREDICTED, head[1:])
+
+
+WIDE = 0.9
+"""Lowest factor of tolerances that the page does not show."""
+
+
+def tolerances_table() -> writer.Table:
+    rows = [
+        (one.what, f"{one.low:.3g} to {one.high:.3g}", one.source)
+        for one in (*predict.COVER.values(), *predict.CIRCUIT.values())
+    ]
+    wide = [one.what for one in predict.COVER.values() if one.low < WIDE]
+    return writer.Table(("times the stated value", "factor", "source"), rows, lambda row: row[0] in wide)
 
 
 def _interval(one: predictions.Prediction) -> str:

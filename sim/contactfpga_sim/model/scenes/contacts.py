@@ -73,8 +73,8 @@ class Contact:
 
     shape: Shape | Callable[[float], Shape]
     """Parts: of a body as they are at its depth, else as they are pressed; or a function of time in s."""
-    body: str | None = "finger"
-    """Name of what presses, of :data:`contactfpga.design.cover.BODIES`; None: the shape is as it is pressed."""
+    body: str | Body | None = "finger"
+    """What presses, or its name in :data:`contactfpga.design.cover.BODIES`; None: the shape is as it is pressed."""
     speed_mm_s: float | None = None
     """Speed at which a body comes, from its first touch at 0 s until it has its force; None: it has it at once."""
     x_mm: Value
@@ -103,7 +103,8 @@ class Contact:
         """
         if self.body is None or callable(self.shape):
             return self
-        body, pitch = BODIES[self.body], (pitch_x_mm * M, pitch_y_mm * M)
+        body = BODIES[self.body] if isinstance(self.body, str) else self.body
+        pitch = (pitch_x_mm * M, pitch_y_mm * M)
         bare = cover is None or cover.model == "patch"
         if bare and self.speed_mm_s is None:
             return dataclasses.replace(self, body=None)
