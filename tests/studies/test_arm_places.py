@@ -13,7 +13,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm import anywhere, places
-from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
+from contactfpga_sim.lab.arm.anywhere import BEST, FLUSH, GEOMETRIES, WAYS, Geometry
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Peaks
 from contactfpga_sim.lab.arm.run import run
@@ -126,12 +126,12 @@ def made_up(newtons):
 
 
 def test_the_sentence_names_what_takes_the_most():
-    latency = {(PAPER, "6 ms"): 18.0, (PAPER, "pin"): 14.0}
-    for name, value, word in (("face", "tiles", "face"), ("threshold_n", 0.2, "threshold"), ("pitch_mm", 6.4, "pitch")):
-        found = made_up({PAPER._replace(**{name: value}): 10.0} | latency)
-        assert f"What matters most is the {word}" in anywhere.matters(found)
-        assert "-5.0 N" in anywhere.matters(found)
-    assert "What matters most is the latency: pin" in anywhere.matters(made_up(latency))
+    latency = {(FLUSH, "6 ms"): 18.0, (FLUSH, "pin"): 14.0}
+    for field, value, what in (("face", "tiles", "face: tiles"), ("threshold_n", 0.2, "threshold: 0.2")):
+        found = anywhere.matters(made_up({FLUSH._replace(**{field: value}): 10.0} | latency))
+        assert f"What matters most against a rigid body is the {what} -5.0 N in" in found
+        assert "latency pin -4.0 N" in found
+    assert "rigid body is the latency: pin -4.0 N" in anywhere.matters(made_up(latency))
 
 
 def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):

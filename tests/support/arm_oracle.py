@@ -17,7 +17,7 @@ def hertz(depth):
 class Layers:
     """A round body of R* = 38 mm on foam over domes of 0.2 mm, by its closed form in the pressure at the middle.
 
-    ``foam`` and ``flesh`` are (thickness in m, modulus in Pa), ``flesh`` None for a rigid body. The pressure p presses a
+    ``foam`` and ``flesh`` are (thickness in m, modulus in Pa); a rigid body has no flesh. The pressure p presses a
     layer with p = E e/(1 - e) in by h p/(E + p), which takes the energy h E (ln(1 + p/E) - p/(E + p)) per area.
     """
 

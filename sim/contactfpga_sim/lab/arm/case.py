@@ -117,8 +117,10 @@ class Case:
             new[name] = change
         return dataclasses.replace(self, **new)
 
-    def wearing(self, cover: Cover) -> Case:
-        """A copy whose arm is covered with this."""
+    def wearing(self, cover: Cover | None) -> Case:
+        """A copy whose arm has this cover; None: the same."""
+        if cover is None:
+            return self
         foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
         return self.but(model=cover.model, cap=cover.cap, foam=foam, switch=dataclasses.asdict(cover.switch))
 
