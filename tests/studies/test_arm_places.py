@@ -105,6 +105,7 @@ def halves(first, second, limited=0.0):
 def test_a_worst_value_that_another_seed_changes_gives_way_to_a_quantile():
     even = np.linspace(5.0, 10.0, 60)
     assert anywhere.worst_text(halves(even, even + 0.2)) == "10.2"
+    assert anywhere.peak_text(halves(even, even + 1000)) == "solid"
     found = anywhere.worst_text(halves(even, np.append(even[:-1], 12.0)))
     values = np.sort([*even, *even[:-1], 12.0])
     low, high = (values[int(binom.ppf(share, 120, 0.95)) - 1 + after] for share, after in ((0.025, 0), (0.975, 1)))

@@ -18,7 +18,10 @@ from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 
-TOUCHES = 60
+TOUCHES = 40
+
+SOLID_N = 1000.0
+"""Peak force at which foam and flesh are long pressed solid; what it is then, the rigid bodies decide."""
 
 SAME = 0.03
 """Largest relative difference of the two halves of the touches at which a worst value is printed."""
@@ -56,7 +59,7 @@ class Geometry(NamedTuple):
 PAPER = Geometry("flush, point force", 10.0, 1.0, 5.0)
 FLUSH = PAPER._replace(face="flush")
 BEST = Geometry("tiles", 6.4, 0.4, 5.0)
-CHANGES = (
+CHANGES: tuple[tuple[str, Any], ...] = (
     ("face", "buttons"),
     ("face", "caps"),
     ("face", "tiles"),
@@ -135,7 +138,9 @@ def worst_text(halves: Sequence[Peaks]) -> str:
 
 
 def peak_text(halves: Sequence[Peaks]) -> str:
-    """Worst and mean peak force in N."""
+    """Worst and mean peak force in N, or ``solid`` (:data:`SOLID_N`)."""
+    if max(half.force_n.max() for half in halves) > SOLID_N:
+        return "solid"
     return f"{worst_text(halves)} / {mean_n(halves):.1f}"
 
 

@@ -20,8 +20,6 @@ from contactfpga_sim.lab.arm.anywhere import WAYS, Found
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies
 
-TOUCHES = 40
-
 BODIES = ("forearm", "palm", "rigid")
 
 PAPER_SHEETS = {"paper, point force": anywhere.PAPER, "paper": anywhere.FLUSH}
@@ -57,7 +55,7 @@ def ways(kit: Kit, finger: Finger) -> tuple[Latencies, ...]:
 def study(
     fingers: Iterable[tuple[Kit, Finger]], bodies: tuple[str, ...] = BODIES, times: tuple[int, ...] = (1, 2)
 ) -> dict[Collision, list[Batch]]:
-    """Batches of touches anywhere under each kit and the paper's sheets, at these times the speed of the case."""
+    """Batches of touches anywhere, under each kit at these times the case's speed, under the paper's sheets at it."""
     paper = Case.load("paper")
     known, speed = anywhere.ways(paper, Skin()), paper.link.speed_m_s
     sheets = [
@@ -66,11 +64,12 @@ def study(
     sheets += [(name, sheet.case(), Skin(), known) for name, sheet in PAPER_SHEETS.items()]
     return {
         Collision(name, body, each * speed): places.batches(
-            case.but(body=body, link={"speed_m_s": each * speed}), skin, latencies, TOUCHES
+            case.but(body=body, link={"speed_m_s": each * speed}), skin, latencies, anywhere.TOUCHES
         )
         for name, case, skin, latencies in sheets
         for body in (bodies if case.model == "foam" else ("rigid",))
         for each in times
+        if each == 1 or name not in PAPER_SHEETS
     }
 
 
