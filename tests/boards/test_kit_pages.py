@@ -21,7 +21,9 @@ from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
-from contactfpga_sim.lab.kits import counts, predict, sensitivity
+from contactfpga_sim.lab.arm import kits as kits_arm
+from contactfpga_sim.lab.arm.places import Peaks
+from contactfpga_sim.lab.kits import counts, predict, sensitivity, tables
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.scenes.families import placements
 
@@ -144,6 +146,31 @@ def test_a_file_that_is_wrong_is_refused(tmp_path):
     file.write_text("[[prediction]]\nnome = 1\n")
     with pytest.raises(KitError, match=r"unknown key 'nome' in \[prediction\]; did you mean 'name'\?"):
         predictions.load(kit)
+
+
+def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monkeypatch):
+    """With made-up forces: the foam's thickness in mm, 10 N more of a rigid body, 100 N more of each way."""
+
+    def force(one, way):
+        return 1e3 * one.case.cover.thickness_m + 10 * (one.case.body == "rigid") + 100 * way
+
+    def made_up(study, workers):
+        return {
+            each: [[Peaks(np.array([force(one, way)]), None, None)] * 2 for way in (1, 2, 3, 4)]
+            for each, (one, _) in study.items()
+        }
+
+    monkeypatch.setattr(kits_arm, "ways", lambda kit, finger: ((),) * 4)
+    monkeypatch.setattr(kits_arm.anywhere, "ways", lambda case, skin: ((),) * 4)
+    monkeypatch.setattr(kits_arm.anywhere, "many", made_up)
+    text = kits.kit("starter").skin_path.read_text()
+    (tmp_path / "skin.toml").write_text(text.replace("thickness_m = 0.002", "thickness_m = 0.003"))
+    thick = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
+    rows = list(tables._peak_rows([tables.KitFigures(thick, None, ())]))
+    assert [row[1] for row in rows] == [
+        f"**{n}03.0 / {n}03.0 N** forearm, **{n}13.0 / {n}13.0 N** rigid" for n in "214"
+    ]
+    assert all("05.0 / " in row[2] for row in rows)
 
 
 def test_the_tutorial_lists_the_parts_of_the_starter_kit():

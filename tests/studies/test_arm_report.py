@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from study_pages import section
 
+from contactfpga.design import kits
+from contactfpga.design.cover import load_cover
 from contactfpga.tools import cli
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import comply, report, tables
@@ -51,6 +53,19 @@ def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_befo
     pictures = {path.name for path in tmp_path.iterdir()}
     assert pictures == {f"arm-{name}.{end}" for name in ("fig6-speed", "fig7-torque") for end in ("png", "svg")}
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
+
+
+def test_a_skin_brings_its_own_cover_and_no_columns_of_the_paper(monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(report, "columns", lambda *given: asked.append(given))
+    monkeypatch.setattr(report, "as_json", lambda *given: {})
+    path = kits.kit("starter").skin_path
+    assert cli.main(["study", "arm", "--json", "--places", "0", "--skin", str(path), "--body", "forearm"]) == 0
+    ((case, name, _, skin),) = asked
+    assert (case.cover, case.body, skin.pitch_x_mm) == (load_cover(path), "forearm", 6.4)
+    assert name == f"paper under {path} against forearm"
+    assert cli.main(["study", "arm", "--json", "--body", "forearm"]) == 1
+    assert "the model 'point' knows rigid ones alone" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -145,4 +160,4 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert section("arm.md", "set") == writer.spelled(str(tables.set_table(tables.ArmRuns(None, {}, found, {}))))
+    assert section("arm.md", "set") == writer.spelled(str(tables.set_table(tables.ArmRuns(None, {}, found, {}, {}))))

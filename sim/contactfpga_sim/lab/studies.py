@@ -11,7 +11,7 @@ _ALL = (
         page="arm.md",
         minutes=5,
         sections=tables(
-            "places set sheet defense",
+            "places kits set sheet defense",
             matters=Section("tables:matters_text"),
             speeds=Section("tables:speed_table"),
             pushes=Section("tables:push_table", sample="tables:push_table"),

@@ -117,6 +117,13 @@ class Case:
             new[name] = change
         return dataclasses.replace(self, **new)
 
+    def wearing(self, cover: Cover | None) -> Case:
+        """A copy whose arm has this cover; None: the same."""
+        if cover is None:
+            return self
+        foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
+        return self.but(model=cover.model, cap=cover.cap, foam=foam, switch=dataclasses.asdict(cover.switch))
+
     @classmethod
     def load(cls, name: str | Path) -> Case:
         """Load a packaged case by name, or a TOML file; its ``like`` names the case it differs from."""
