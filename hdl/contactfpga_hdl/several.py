@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.several import Several
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 

@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader

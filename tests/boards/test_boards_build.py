@@ -12,7 +12,7 @@ from contactfpga.boards import BOARDS
 from contactfpga.design import kits
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_hdl.board import build, placed
+from contactfpga_hdl.board import build, pnr_report
 from contactfpga_hdl.board.build import LOG, BitstreamFailed, _why
 from contactfpga_hdl.board.constraints import FOLDER, PAGE, constraints, page_with_tables
 
@@ -70,7 +70,7 @@ def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
     assert not (tmp_path / "contactfpga.bit").exists()
     assert Skin.load(tmp_path / "skin.toml") == ULX3S.skin
     said = ["LUT4         7 of 9", "flip-flops   5", "block RAMs   1 of 2", "Fmax         20.0 MHz, needed 25 MHz"]
-    assert placed.read(tmp_path, LOG).lines() == said
+    assert pnr_report.read(tmp_path, LOG).lines() == said
 
 
 def test_a_router_that_does_not_end_is_stopped(tmp_path, monkeypatch):
@@ -101,7 +101,7 @@ def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
 
 def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
     def built(skin, board, folder, seed):
-        return placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+        return pnr_report.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
 
     monkeypatch.setattr(build, "build", built)
     assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0

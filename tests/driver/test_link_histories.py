@@ -7,7 +7,7 @@ import random
 
 import pytest
 from sample import sample
-from scheduled import Schedule
+from schedule import Schedule
 from world import Witness, World
 
 from contactfpga import BoardClosed, Skin

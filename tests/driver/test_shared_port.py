@@ -15,7 +15,7 @@ from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
 from contactfpga.driver.finding import Candidate
 from contactfpga.tools.cli import main
-from contactfpga.wire.numbered import numbered, sheet_of, unnumbered
+from contactfpga.wire.sheet_number import numbered, sheet_of, unnumbered
 
 SKINS = (Skin(name="chest", row_drive="74hc595", column_read="74hc165"), Skin(name="back", rows=9, columns=7))
 

@@ -31,7 +31,7 @@ class Fault(NamedTuple):
 GATEWARE = "tests/gateware"
 FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
 FAULTS = {
-    "readings go out with a report": Fault("link/between.py",
+    "readings go out with a report": Fault("link/other_packets.py",
         "hello_due | self._wire.take_report | frame_waits & ~units_next", "hello_due | frame_waits & ~units_next",
         f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says"),
     "a sweep's region is written as it goes out": Fault("units/pack.py",
@@ -89,7 +89,7 @@ FAULTS = {
     "what was well in a fault counts": Fault("link/alive.py", "(seen & ~ticks | self.well) & ~self.fault",
         "(seen & ~ticks & ~self.fault) | self.well",
         f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick"),
-    "frames between readings are not counted anew": Fault("link/between.py", "[self._frames.eq(0), ", "[",
+    "frames between readings are not counted anew": Fault("link/other_packets.py", "[self._frames.eq(0), ", "[",
         f"{GATEWARE}/test_link.py::test_readings_go_after_each_four_frames_that_follow_one_another"),
     "one carry of two is lost": Fault("link/odometer.py", "epoch_waits.eq(epoch_waits & sent_waits)",
         "epoch_waits.eq(0)", f"{GATEWARE}/test_link.py::test_carries_that_come_in_one_clock_are_both_counted"),

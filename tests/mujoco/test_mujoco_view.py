@@ -12,7 +12,7 @@ pytest.importorskip("viser")
 import contactfpga
 from contactfpga.tools.view import chart, obstacle, opening
 from contactfpga.tools.view.fingers import Finger
-from contactfpga.tools.view.simulated import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
+from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
 from contactfpga_sim.lab.mujoco.clip import Asked
 from contactfpga_sim.lab.view import browser
 

@@ -7,7 +7,7 @@ import random
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
-from tracked import SKIN, frame, moments, pressed, run
+from tracker_frames import SKIN, frame, moments, pressed, run
 
 from contactfpga import Tracker
 from contactfpga.tracking.assignment import assign

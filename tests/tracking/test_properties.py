@@ -5,7 +5,7 @@ import math
 import random
 
 import pytest
-from tracked import frame, run
+from tracker_frames import frame, run
 
 from contactfpga import Skin, Tracker
 

@@ -9,7 +9,7 @@ pytest.importorskip("websockets")
 pytest.importorskip("amaranth")
 
 from fake_board import wait_until
-from viewed import Page, camera, click, drag
+from view_page import Page, camera, click, drag
 
 import contactfpga
 from contactfpga.tools.view import opening

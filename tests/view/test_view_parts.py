@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fake_board import wait_until
-from tracked import frame
+from tracker_frames import frame
 
 from contactfpga import Skin
 from contactfpga.driver import driver

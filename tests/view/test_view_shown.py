@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from tracked import frame, moments
+from tracker_frames import frame, moments
 
 from contactfpga import Skin
 from contactfpga.tools.view import cameras, chart, contacts, glow, limb, page, panel, picture, ruler

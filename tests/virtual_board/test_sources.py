@@ -69,7 +69,7 @@ for line in ["", *sys.stdin.read().splitlines()]:
         file.write_bytes(before)
 assert "amaranth" not in sys.modules
 """
-SIZING = ("sizes.py", "placed.py", "synthesis.py", "tools.py")
+SIZING = ("sizes.py", "pnr_report.py", "synthesis.py", "tools.py")
 BOARD = "native.skin_key(skin)"
 CARRIED = "__import__('contactfpga_sim.model.board.compiled', fromlist=['']).carried_key(skin)"
 
@@ -185,7 +185,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     ],
 )
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
-    key = f"__import__('contactfpga_sim.apps.kept', fromlist=['']).made_by({module!r})"
+    key = f"__import__('contactfpga_sim.apps.result_cache', fromlist=['']).made_by({module!r})"
     paths = [(copy / "sim/contactfpga_sim/lab" / name).resolve() for name in files]
     page = copy / "sim/contactfpga_sim/lab/flips/tables.py"
     now, changed = keys(copy, key, [*paths, page])

@@ -20,7 +20,7 @@ from amaranth.hdl import Cat, Elaboratable, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga_hdl.board import placed, synthesis
+from contactfpga_hdl.board import pnr_report, synthesis
 from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
 
@@ -135,9 +135,9 @@ def _folder() -> Iterator[Path]:
 
 
 def _fmax(folder: Path, device: Device, seed: int) -> float:
-    options = ("--report", placed.FILE, "--seed", str(seed), "--timing-allow-fail", "--freq", "12")
+    options = ("--report", pnr_report.FILE, "--seed", str(seed), "--timing-allow-fail", "--freq", "12")
     (folder / "log").write_text(_run(folder, *device.place, "--json", "netlist.json", *options))
-    return placed.read(folder, "log").fmax_mhz
+    return pnr_report.read(folder, "log").fmax_mhz
 
 
 def _synthesize(design: str, device: Device, folder: Path, before: tuple[str, ...] | None) -> None:

@@ -8,15 +8,15 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS
-from contactfpga.wire import numbered, protocol
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire import protocol, sheet_number
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
 from contactfpga_hdl.util.upset import upset_places
 
 if TYPE_CHECKING:
-    from contactfpga_hdl.link.between import Readings, Reports
+    from contactfpga_hdl.link.other_packets import Readings, Reports
 
 HELLO_REGION = 3
 
@@ -50,7 +50,7 @@ class Link(wiring.Component):
     Three regions of one memory rotate among the three frames; a fourth holds the hello. As its end mark is packed, a
     new frame drops and counts a waiting one, whose place it takes when complete. Nothing here blocks the stages before.
     The hello is fixed except for the digits of its state, each read in the clock before its byte is offered.
-    :mod:`contactfpga_hdl.link.between` has the order of packets.
+    :mod:`contactfpga_hdl.link.other_packets` has the order of packets.
 
     frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -137,7 +137,7 @@ class Link(wiring.Component):
     def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
         if not self._optional_ports():
             return []
-        from contactfpga_hdl.link.between import Readings, Reports
+        from contactfpga_hdl.link.other_packets import Readings, Reports
 
         kinds = [Reports] * hasattr(self, "faults") + [Readings] * hasattr(self, "units")
         return [kind(m, self, wire) for kind in kinds]
@@ -265,7 +265,7 @@ class Link(wiring.Component):
 
     def _closing(self, crc: Value) -> list[Value]:
         """The sheet's number, if any, and the CRC in pieces of seven bits, so that no byte is zero."""
-        number = b"" if self.place is None else numbered.closing(self.place.number)
+        number = b"" if self.place is None else sheet_number.closing(self.place.number)
         return [
             *(Const(byte, 8) for byte in number),
             *(Cat(crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)),

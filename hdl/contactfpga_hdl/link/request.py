@@ -7,7 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import CHECK_BYTES, HEARD_BITS
-from contactfpga.wire import numbered, protocol
+from contactfpga.wire import protocol, sheet_number
 from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
@@ -32,7 +32,7 @@ class RequestReader(wiring.Component):
 
     def __init__(self, commands: bool = False, sheet: int | None = None):
         self.commands = commands
-        self._closing = b"" if sheet is None else numbered.closing(sheet)
+        self._closing = b"" if sheet is None else sheet_number.closing(sheet)
         self._kind = _WHAT + _ARGUMENTS * commands  # the last byte's place
         self._first_check = self._kind + len(self._closing) + 1
         self._whole = self._first_check + CHECK_BYTES  # bytes up to the delimiter

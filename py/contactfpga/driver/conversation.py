@@ -28,8 +28,8 @@ from contactfpga.wire import framing, protocol
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot
 from contactfpga.wire.hello import Hello, describe, difference
-from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import OldPacket, PacketError, frame_of
+from contactfpga.wire.sheet_number import sheet_of
 from contactfpga.wire.table import PacketTable
 from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.run import Run

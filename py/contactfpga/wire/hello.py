@@ -12,7 +12,7 @@ from contactfpga.skin.derived import CHECK_BYTES, SELF_TEST, pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga.wire.units import FACTS_BYTES, UnitFacts
 
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet.drawn import BOARDS, TRACK_MM, Drawing
+from contactfpga.design.sheet.drawing import BOARDS, TRACK_MM, Drawing
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SwitchPart
 from contactfpga.skin import Skin

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
-from contactfpga.robot.body import Body, LinkContact, LinkState, packed
+from contactfpga.robot.body import Body, LinkContact, LinkState, robot_texts
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import open_board
@@ -256,7 +256,7 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
         self._recording = recording
         self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
         try:
-            self.body = packed.unpack(recording.texts(packed.ROBOT)[0], Path(self._folder.name))
+            self.body = robot_texts.unpack(recording.texts(robot_texts.ROBOT)[0], Path(self._folder.name))
         except BaseException:
             self._folder.cleanup()
             raise
@@ -296,5 +296,5 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
 
 def holds_robot(recording: Recording) -> bool:
     """Whether a recording has a robot with all files of its table, which earlier versions omitted."""
-    texts = recording.texts(packed.ROBOT)
-    return bool(texts) and set(texts[0]) != {packed.TOML}
+    texts = recording.texts(robot_texts.ROBOT)
+    return bool(texts) and set(texts[0]) != {robot_texts.TOML}

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import Stats
 from contactfpga.robot.haptics import LoadCells
-from contactfpga.tools.view.replayed import BoardRecording
+from contactfpga.tools.view.board_recording import BoardRecording
 from contactfpga.tools.view.sources import STEP_S, Meter, Moment
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks

@@ -11,8 +11,8 @@ from contactfpga.tools.view.bodies import OVERVIEW, ROBOT_SIDES, DrawnRobot, Rob
 from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import MOST_N, shortened
+from contactfpga.tools.view.robot_source import ALL, BARE, NO_REFLEX, SKINS, SWEEP_S, RobotCopy, SimulatedSource
 from contactfpga.tools.view.robot_stage import ROOT, RobotStage
-from contactfpga.tools.view.simulated import ALL, BARE, NO_REFLEX, SKINS, SWEEP_S, RobotCopy, SimulatedSource
 from contactfpga.tools.view.sources import KEEPS_UP
 from contactfpga.tools.view.tiles import MM
 

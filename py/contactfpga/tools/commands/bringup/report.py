@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from contactfpga import __version__
-from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit, FittedValue
+from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit, FittedValue
 from contactfpga.design.cover.fitted import FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from contactfpga.design.circuit import CircuitError
-from contactfpga.design.circuit.fitted import SettleReading, fit_circuit
+from contactfpga.design.circuit.fit import SettleReading, fit_circuit
 from contactfpga.design.circuit.values import LIMITS
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
