@@ -258,7 +258,7 @@ def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(m
     from contactfpga_sim.apps import size
     from contactfpga_sim.lab.closed import tables
 
-    monkeypatch.setattr(size.result_cache, "kept", None)  # nothing is measured
+    monkeypatch.setattr(size.result_cache, "cached", None)  # nothing is measured
     closed, skin_of = STUDIES["closed"], tables.skin_of
     before = fingerprints.fingerprint(closed, "closed_size")
     assert fingerprints.fingerprint(closed, "closed_size") == before

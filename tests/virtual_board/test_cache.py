@@ -36,7 +36,7 @@ def test_modes_do_not_depend_on_the_umask(tmp_path, monkeypatch):
     with cache.locked(folder / "x.lock"), cache.scratch(folder, "build") as work:
         assert mode(work) == 0o700
     monkeypatch.setattr(result_cache, "cache_folder", lambda: folder)
-    result_cache.kept("kind", "key", lambda: 1)
+    result_cache.cached("kind", "key", lambda: 1)
     assert [mode(path) for path in (folder, folder.parent)] == [0o700] * 2
     assert {mode(path) for path in folder.iterdir()} == {0o600}
 
@@ -236,13 +236,13 @@ def test_a_library_without_its_sum_is_built_again(tmp_path, damaged):
 
 def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path))
-    assert result_cache.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+    assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
     (path,) = tmp_path.glob("*.json")
     for damaged in (b"", b"[1, 2", b"[1, 23]"):
         path.write_bytes(damaged)
-        assert result_cache.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+        assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
         assert capsys.readouterr().err == f"contactfpga: {path} in the cache is damaged; it is made again\n"
-    assert result_cache.kept("kind", "key", lambda: 5) == [1, 22]
+    assert result_cache.cached("kind", "key", lambda: 5) == [1, 22]
 
 
 @pytest.mark.campaign  # it compiles a board in a cache of its own

@@ -67,21 +67,21 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
     if _noted(component):
         return Size(1, 1, 1, 1.0)
     how = _how(component(), device, seeds)
-    return Size(**result_cache.kept("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
+    return Size(**result_cache.cached("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
 
 
 def measure_netlists(netlists: Netlists, device: Device, seeds: int, before: tuple[str, ...]) -> Size:
     """:func:`contactfpga_hdl.board.sizes.measure_netlists`, cached by netlists and options."""
     how = repr((netlists, before, seeds, tools(device)))
     new = functools.partial(sizes.measure_netlists, netlists, device, seeds, before)
-    return Size(**result_cache.kept("size", how, lambda: dataclasses.asdict(new())))
+    return Size(**result_cache.cached("size", how, lambda: dataclasses.asdict(new())))
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     """:func:`contactfpga_hdl.board.sizes.luts`, cached."""
     if _noted(component):
         return 1
-    found: int = result_cache.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
+    found: int = result_cache.cached("luts", _how(component(), device), lambda: sizes.luts(component, device))
     return found
 
 

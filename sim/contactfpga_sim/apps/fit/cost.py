@@ -34,5 +34,5 @@ def luts_of(skin: Skin) -> int:
     """LUT4 of the design; takes seconds unless cached."""
     # A cached count spares looking at the netlist of the same Skin again.
     key = f"{result_cache.made_by(__name__, skin)} {size.tools(DEVICE)}"
-    found: int = result_cache.kept("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
+    found: int = result_cache.cached("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
     return found

@@ -80,7 +80,7 @@ def _batch(
         return [one | felt for one in values]
 
     key = _key(task, source, skins, cover, numbers, count, force_n)
-    found: list[Values] = result_cache.kept("fit-errors", key, new)
+    found: list[Values] = result_cache.cached("fit-errors", key, new)
     return found
 
 
@@ -107,7 +107,7 @@ def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, oth
     count = source.most(task.count)
     timed = min(task.timed, count)
     numbers = [others * count + index * count // timed for index in range(timed)]
-    return Speed(**result_cache.kept("fit-speed", _key(task, source, [skin], cover, numbers, count, checked), new))
+    return Speed(**result_cache.cached("fit-speed", _key(task, source, [skin], cover, numbers, count, checked), new))
 
 
 def _key(task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, *more: Any) -> str:

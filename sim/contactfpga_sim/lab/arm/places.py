@@ -85,7 +85,7 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     Cached."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
     key = f"{result_cache.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
-    found: list[list[tuple[float, float, bool]]] = result_cache.kept("places", key, lambda: _touched(batch))
+    found: list[list[tuple[float, float, bool]]] = result_cache.cached("places", key, lambda: _touched(batch))
     return found
 
 
@@ -134,7 +134,7 @@ def _step_s(case: Case) -> float:
 def measured_s(case: Case, skin: Skin, way: str) -> Latencies:
     """Times in s from a switch to the controller's input over :data:`INSTANTS` touches, by ``uart`` or ``pin``."""
     key = f"{result_cache.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
-    found: list[float] = result_cache.kept("latencies", key, lambda: _measured(case, skin, way))
+    found: list[float] = result_cache.cached("latencies", key, lambda: _measured(case, skin, way))
     return tuple(found)
 
 

@@ -49,7 +49,7 @@ class SweepPoint:
 def work(task: SweepTask) -> dict[str, float]:
     """Fields of the task's :class:`SweepPoint`, cached by code."""
     key = f"{result_cache.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
-    return result_cache.kept("arm", key, lambda: dataclasses.asdict(_point(task)))
+    return result_cache.cached("arm", key, lambda: dataclasses.asdict(_point(task)))
 
 
 def sweep(

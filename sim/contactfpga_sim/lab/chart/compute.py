@@ -140,7 +140,7 @@ def accuracy(task: Task, first: int) -> Found:
         scenes = _touches(task, first)
         return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
-    return result_cache.kept("accuracy", _key(task, "accuracy", first), new)
+    return result_cache.cached("accuracy", _key(task, "accuracy", first), new)
 
 
 def timings(task: Task) -> list[Raw]:
@@ -158,7 +158,7 @@ def timing(task: Task, first: int) -> Raw:
     def new() -> Raw:
         return times.measured(_touches(task, first), task.skin, task.cover, first, task.checked)
 
-    return result_cache.kept("timing", _key(task, "timing", first), new)
+    return result_cache.cached("timing", _key(task, "timing", first), new)
 
 
 def _touches(task: Task, first: int) -> list[Scene]:

@@ -83,7 +83,7 @@ def _block(design: str, memory: bool, block: int) -> list[FlipOutcome]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[FlipOutcome] = result_cache.kept("flips", _key(design, memory, block), new)
+    rows: list[FlipOutcome] = result_cache.cached("flips", _key(design, memory, block), new)
     return rows
 
 

@@ -107,7 +107,7 @@ def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], Non
     skins = design.skins if isinstance(design, Several) else (design,)
     code = result_cache.made_by(campaign.__name__, *skins)
     key = f"{name}, {each} of {seed}, {long_s} s, {code}"
-    found = result_cache.kept(
+    found = result_cache.cached(
         "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]
     )
     return [Result(one["skin"], Mutant(**one["mutant"]), one["fate"]) for one in found]

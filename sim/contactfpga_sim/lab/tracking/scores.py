@@ -330,7 +330,7 @@ Scores = dict[str, Score]
 def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str, ...] = tuple(TRACKERS)) -> Scores:
     """Scores on random scenes, the same at every rate; cached."""
     key = repr((result_cache.made_by(__name__), family, rate_hz, count, names))
-    found = result_cache.kept("tracking", key, lambda: _scored(family, rate_hz, count, names))
+    found = result_cache.cached("tracking", key, lambda: _scored(family, rate_hz, count, names))
     return {name: Score(**one) for name, one in found.items()}
 
 
