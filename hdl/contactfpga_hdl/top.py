@@ -156,8 +156,8 @@ class Top(wiring.Component):
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         stuck = scan.stuck if self.derived.scan.waits else 0  # before a frame begins and counts it
-        told = scan.faults.as_value().any() if hasattr(scan, "faults") else 0
-        m.d.comb += fault.eq(scan.tag.fault | stuck | told)
+        reported = scan.faults.as_value().any() if hasattr(scan, "faults") else 0
+        m.d.comb += fault.eq(scan.tag.fault | stuck | reported)
         # Where one may fall as another rises, a register keeps that from the pin.
         if self.skin.fail_safe:
             level = scan.contact | over | fault | unwatched | self._blind(m, packer)

@@ -41,7 +41,7 @@ def test_the_page_has_the_pin_tables():
 # ---- build, as far as it goes without the tools
 
 
-def test_a_design_that_does_not_fit_is_told_by_numbers(tmp_path):
+def test_a_design_that_does_not_fit_is_reported_by_numbers(tmp_path):
     log = tmp_path / "contactfpga.tim"
     log.write_text("Info:    ICESTORM_LC:    1885/   1280   147%\nInfo:  SB_IO:  20/ 96 20%\n")
     assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1885 ICESTORM_LC of 1280 (147 %)"
@@ -49,7 +49,7 @@ def test_a_design_that_does_not_fit_is_told_by_numbers(tmp_path):
     assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1173 ICESTORM_LC of 1280 (91 %)"
 
 
-def test_without_a_reason_the_first_error_is_told(tmp_path):
+def test_without_a_reason_the_first_error_is_reported(tmp_path):
     assert _why(tmp_path, "Info: y\nERROR: no such pin\nERROR: z") == "ERROR: no such pin"
 
 

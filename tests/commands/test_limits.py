@@ -1,4 +1,4 @@
-"""What a file from a stranger may cost: memory and processor time are bounded, and a limit is told in one line."""
+"""What a file from a stranger may cost: memory and processor time are bounded, and a limit is reported in one line."""
 
 import io
 import time

@@ -278,10 +278,10 @@ def test_records_that_come_at_any_time_go_out_as_frames(seed):
             if restarts:
                 noted[clock], left = Packed(None), 0
             if comes:
-                told = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
-                noted[clock] = Packed(item) if left else Packed(None, told, sent)
-                ctx.set(dut.tag.time, told["time"])
-                ctx.set(dut.summary, {"zones": told["zones"], "cells": told["cells"]})
+                closing = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
+                noted[clock] = Packed(item) if left else Packed(None, closing, sent)
+                ctx.set(dut.tag.time, closing["time"])
+                ctx.set(dut.summary, {"zones": closing["zones"], "cells": closing["cells"]})
             ctx.set(dut.restart, restarts)
             ctx.set(dut.taken, comes)
             ctx.set(dut.send, sent)

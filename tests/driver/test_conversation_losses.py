@@ -78,7 +78,7 @@ def test_frames_that_come_twice_are_passed_on_once(rng):
 # ---- restarts
 
 
-def test_a_restart_is_told_by_its_hello():
+def test_a_restart_is_reported_by_its_hello():
     line = Line()
     line.board.sent, line.board.time_us, line.board.heard = 100, 5_000_000, 3
     line.hello()

@@ -201,7 +201,7 @@ def test_a_client_that_left_does_not_end_the_board(pty_board):
             assert opened.next(LONG).pressed == opened.next(LONG).pressed
 
 
-def test_a_scene_that_raises_ends_the_port_and_is_told():
+def test_a_scene_that_raises_ends_the_port_and_is_reported():
     from contactfpga_sim.model.board.pty_board import PtyBoard
 
     def press(seconds):

@@ -190,7 +190,7 @@ def test_an_address_has_one_reading(address, meant):
         ("flexitac:///dev/x?rows=999", "rows is '999'; it must be a whole number from 1 to 64"),
     ],
 )
-def test_what_is_no_address_is_told(address, message):
+def test_what_is_no_address_is_reported(address, message):
     with pytest.raises(AddressError) as caught:
         parse(address)
     assert message in str(caught.value)
@@ -211,7 +211,7 @@ def test_what_is_no_address_is_told(address, message):
         ({}, "?frames=1000", contactfpga.ReadTimeout, "the first frames tell how cells read at rest; give it a longer"),
     ],
 )
-def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, said):
+def test_a_sheet_without_a_frame_is_reported_by_what_it_sent(sheet, options, error, said):
     def raised(timeout_s):
         with pytest.raises(contactfpga.ReadTimeout) as caught:
             contactfpga.open(f"flexitac://{sent.port}{options}", timeout=timeout_s)
@@ -224,6 +224,6 @@ def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, 
     assert "hello" not in str(found)
 
 
-def test_a_port_that_is_not_there_is_told():
+def test_a_port_that_is_not_there_is_reported():
     with pytest.raises(PortNotFound, match="/dev/nowhere"):
         contactfpga.open("flexitac:///dev/nowhere")

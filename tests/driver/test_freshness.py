@@ -99,11 +99,11 @@ def test_the_logger_tells_of_the_board_its_restarts_and_losses(caplog):
             board.next()
         world.pause(1_200_000)
         board.latest()
-        told = [(record.levelname, record.getMessage()) for record in caplog.records]
+        reported = [(record.levelname, record.getMessage()) for record in caplog.records]
         lost = board.stats.lost
     port = board.port
     assert lost > 0
-    assert told == [
+    assert reported == [
         ("WARNING", f"{port}: the board was restarted"),
         ("WARNING", f"{port}: {lost} frames were lost, {lost} since the port was opened"),
     ]

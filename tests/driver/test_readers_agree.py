@@ -38,7 +38,7 @@ def pairs():
         pair.close()
 
 
-def told(item):
+def described(item):
     """All that a user can see of what came."""
     if isinstance(item, Zones):
         return repr((item.to_dict(), sorted(item.flags), item.sheet, item.frame.heard, item.suspects))
@@ -75,7 +75,7 @@ def facts(link):
     units = history and (history.count, history.lows, history.highs, history.last and history.last.sequence)
     with link.changed:
         silence = str(link.silence(0.0))
-    return repr((said.hello, said.lines.told, said.stats, sorted(said.numbers), link.last_s, units, silence))
+    return repr((said.hello, said.lines.reported, said.stats, sorted(said.numbers), link.last_s, units, silence))
 
 
 class Followers:
@@ -95,7 +95,7 @@ class Followers:
             case 0 | 1:
                 self.pop(self.rng.randrange(40))
             case 2 if not self.all_events:
-                first, second = ([told(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
+                first, second = ([described(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
                 assert first == second
                 self.seen += len(first)
             case 3 if not self.all_events:
@@ -115,7 +115,7 @@ class Followers:
     def pop(self, count):
         for _ in range(count):
             found = [queue.pop() for queue in self.queues]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             if found[0] is None:
                 return
             self.seen += 1
@@ -131,7 +131,7 @@ class Newest:
 
     def step(self):
         found = [self.taken(self.queues[0]), self.newest(self.links[1], self.queues[1])]
-        assert told(found[0]) == told(found[1])
+        assert described(found[0]) == described(found[1])
         self.seen += found[0] is not None
 
     def newest(self, link, queue):
@@ -196,13 +196,13 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
             follower.step()
         for one in list(waiting):
             found = [look() for look in one]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             if found[0] is not None:
                 waiting.remove(one)
                 answered += 1
         if commanded is not None and rng.random() < 0.5:
             found = [look() for look in commanded]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             end_command(pair)
             commanded = None
         pair.now += rng.choice([0.001, 0.1, 0.1, 0.1, 0.1, 9.0])
@@ -253,7 +253,7 @@ def test_times_and_newest_frames_are_the_same_of_a_board_at_its_pace(report, see
     pair.pass_time()
     followers.pop(100_000)
     assert facts(pair.thread) == facts(pair.native)
-    assert [told(first()) for first, _ in looks] == [told(second()) for _, second in looks]
+    assert [described(first()) for first, _ in looks] == [described(second()) for _, second in looks]
     assert newest.seen > 300
     assert newest.shown > newest.seen // 2
     assert pair.thread.conversation.stats.frames > 3000

@@ -27,12 +27,12 @@ def said(events):
     """All that events tell, frame by frame."""
     for event in events:
         if isinstance(event, Run):
-            yield from map(told, event)
+            yield from map(described, event)
         else:
             yield repr(event)
 
 
-def told(zones):
+def described(zones):
     frame = zones.frame
     arrays = tuple(
         None if one is None else (one.dtype, one.tolist()) for one in (frame.moments, frame.bitmap, frame.barycenters)
@@ -90,7 +90,7 @@ def ends_of_single_frames(packets):
 def state(host, name):
     """Of the times."""
     state = {**vars(host._timeline)}
-    state["before"] = state["before"] and told(Zones(state["before"], SKINS[name].sheet))
+    state["before"] = state["before"] and described(Zones(state["before"], SKINS[name].sheet))
     del state["_stats"]
     return state
 

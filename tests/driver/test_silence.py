@@ -75,9 +75,9 @@ def test_silence_is_an_error_that_says_how_long_and_what_came_last(board, port):
     for _ in range(2):
         with pytest.raises(
             contactfpga.NoData, match=r"no data for 0\.\d+ s, the last was frame .*not one byte"
-        ) as told:
+        ) as caught:
             frames.next()
-    silence = told.value.silence
+    silence = caught.value.silence
     assert silence.last.sequence == last.sequence
     assert silence.seconds == pytest.approx(0.1, abs=0.02), "it goes on"
     port.noisy = True
@@ -195,9 +195,9 @@ def test_where_the_clock_jumped_and_no_frame_waited_the_answer_to_a_request_show
 
 def test_the_timeout_may_be_shorter_than_the_deadline(board, port):
     port.dead = True
-    with pytest.raises(contactfpga.ReadTimeout) as told:
+    with pytest.raises(contactfpga.ReadTimeout) as caught:
         board.subscribe(deadline_s=10.0).next(timeout=0.05)
-    assert not isinstance(told.value, contactfpga.NoData)
+    assert not isinstance(caught.value, contactfpga.NoData)
 
 
 @pytest.mark.parametrize("deadline_s", [0, -1, float("nan"), float("inf"), "1"])

@@ -170,7 +170,7 @@ def packed(levels):
 @pytest.mark.whole
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
-def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, method, press, release):
+def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_reported(rng, method, press, release):
     """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
     times = [us + 1 if us else 0 for us in (press, release)]
     skin = UNEVEN.replace(debounce=method, debounce_press_us=press, debounce_release_us=release)

@@ -217,14 +217,14 @@ def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
         asked = {40 * index + 20 for index in (2, 127, 128, 129, 255, 256, 257, 298)}
         sink = run((dut, sim), dut.skin, frames, lambda cycle: True, asked)
     packets, _ = packets_of(sink)
-    sent = told = 0
+    sent = reported = 0
     for begun, packet in packets:
         if packet[0] == 0:
             assert packet == hello_sent(dut.skin, sink, begun, sent)
-            told = max(told, sent)
+            reported = max(reported, sent)
         else:
             sent += 1
-    assert told > 128
+    assert reported > 128
 
 
 def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
@@ -232,21 +232,21 @@ def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
     sim = bench(dut)
     sim.drive(dut.epoch, lambda cycle: int(cycle in epochs))
     asked = {100, 400, 3000, 6000, 6500}
-    while_told = {150, 450, 3050, 6001, 6500, 6550}  # one per hello can wait
-    epochs = {cycle for cycle in range(300, 6500, 40) if not any(0 <= cycle - at < 200 for at in asked)} | while_told
+    while_sent = {150, 450, 3050, 6001, 6500, 6550}  # one per hello can wait
+    epochs = {cycle for cycle in range(300, 6500, 40) if not any(0 <= cycle - at < 200 for at in asked)} | while_sent
     frame = Frame([], dict.fromkeys(TAG | SUMMARY, 0), [1])
     sink = run((dut, sim), dut.skin, [frame], lambda cycle: True, asked, after=7200)
     packets, _ = packets_of(sink)
-    told = []
+    reported = []
     for begun, packet in packets:
         if packet[0] == 0:
             digits = packet[16 + 7 : 16 + 11]
             taken = begun - 2
-            told.append((taken, sum((digit & 127) << 7 * place for place, digit in enumerate(digits))))
-    assert len(told) == 6
-    for taken, epoch in told:
+            reported.append((taken, sum((digit & 127) << 7 * place for place, digit in enumerate(digits))))
+    assert len(reported) == 6
+    for taken, epoch in reported:
         assert epoch == sum(cycle < taken for cycle in epochs), taken
-    assert told[-1][1] > 128
+    assert reported[-1][1] > 128
 
 
 def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng):

@@ -42,10 +42,10 @@ def random_words(rng, cycles, bits, spacing):
 
 def predicted(skin, frames, changes, asked, cycles):
     """The golden model's bytes."""
-    told = faults.FaultHistory()
+    reported = faults.FaultHistory()
     for cycle, word in changes[1:]:
-        told.change(cycle, word)
-    link = Link(facts(skin), State(facts(skin), [], Reception([], [])), told)
+        reported.change(cycle, word)
+    link = Link(facts(skin), State(facts(skin), [], Reception([], [])), reported)
     decided = [taken for taken, _ in decisions(skin, frames, None)]
     period = facts(skin).hello_scans
     for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[period - 1 :: period])]):
@@ -118,8 +118,8 @@ def test_reports_frames_and_hellos_go_out_in_the_model_s_cycles(guarded, rng):
     assert kinds.count(9) > 3
 
 
-def test_after_a_hello_and_after_a_change_the_word_itself_is_told(guarded, rng):
-    """And nothing is told over and over while nothing changes."""
+def test_after_a_hello_and_after_a_change_the_word_itself_is_reported(guarded, rng):
+    """And nothing is reported over and over while nothing changes."""
     dut, sim = guarded
     words = [rng.randrange(1 << 13) for _ in range(4)]
     changes = [(0, 0), *((5000 + 500 * index, word) for index, word in enumerate(words))]
@@ -128,8 +128,8 @@ def test_after_a_hello_and_after_a_change_the_word_itself_is_told(guarded, rng):
     sink = paced(sim, dut.bytes)
     sim.run(10_000)
     packets, _ = packets_of(sink)
-    told = [packet for _, packet in packets if packet[-5] == 0x90]
-    assert told == [report_of("guard", word) for word in (0, 0, *words, words[-1])]
+    reported = [packet for _, packet in packets if packet[-5] == 0x90]
+    assert reported == [report_of("guard", word) for word in (0, 0, *words, words[-1])]
     kinds = [packet[-5] >> 4 for _, packet in packets]
     assert all(after == 9 for kind, after in itertools.pairwise(kinds) if kind == 4)
 

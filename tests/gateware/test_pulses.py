@@ -83,9 +83,9 @@ def test_any_bytes_are_read_as_the_golden_model_does(listen, rng):
             some = bytes(rng.choice([ONE, ZERO, ZERO, MARK]) for _ in range(rng.randrange(20)))
             data += rng.choice([whole, whole, whole[: rng.randrange(len(whole))], some, rng.randbytes(6)])
         found, numbers = listen(line(data, listen.bit))
-        told = heard([(IDLE, data)], listen.bit)
-        assert found == [(one.cycle, one.number, one.hello) for one in told.requests]
-        assert numbers == [told.number(cycle) for cycle in range(len(numbers))]
+        expected = heard([(IDLE, data)], listen.bit)
+        assert found == [(one.cycle, one.number, one.hello) for one in expected.requests]
+        assert numbers == [expected.number(cycle) for cycle in range(len(numbers))]
         total += len(found)
     assert total > 2
 

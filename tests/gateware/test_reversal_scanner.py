@@ -131,8 +131,8 @@ def check_rows(skin: Skin, life: Life, at) -> int:
         if skin.report != "cells" and not before[3]:
             assert row[1] > before[1], "rows ascend"
             assert row[1] == before[1] + 1 or not before[2], "an empty row parts those that are no neighbors"
-    told = [slot for slot, cells in read.items() if cells]
-    for slot, row in zip(told, given):
+    reported = [slot for slot, cells in read.items() if cells]
+    for slot, row in zip(reported, given):
         following = next((other.begin for other in life.slots if other.begin > slot.begin), None)
         assert following is None or following >= row[2] + 4
     for frame in frames(life.slots, life.ends):
@@ -150,8 +150,8 @@ def check_rows(skin: Skin, life: Life, at) -> int:
 
 def check_motion(skin: Skin, life: Life, at) -> set[bool]:
     """A frame tells of motion where a row that it drove had no pressed cell, but not of rows with a masked switch; an
-    untouched sheet does not. Returns what frames told."""
-    told = {False}
+    untouched sheet does not. Returns what frames reported."""
+    reported = {False}
     driven = frames(life.slots, life.ends)
     ends = [end for end in life.ends if end < len(life.motion)]
     begun = [next((end for end in ends if end > frame[-1].sample), None) for frame in driven]
@@ -161,9 +161,9 @@ def check_motion(skin: Skin, life: Life, at) -> set[bool]:
         clean = [slot for slot in frame if present(skin, slot.row) == (1 << skin.columns) - 1]
         moved = any(not at(slot.sample).cells[slot.row] for slot in clean)
         assert life.motion[end] == moved, frame
-        told.add(moved)
+        reported.add(moved)
     assert not any(life.motion[end] for end in ends if end not in begun)
-    return told
+    return reported
 
 
 def check_pins(life: Life) -> None:
@@ -262,8 +262,9 @@ def fought(life: Life, column: int, stuck: range) -> list[int]:
 
 
 @pytest.mark.parametrize("touched", [True, False], ids=["touched", "at rest"])
-def test_a_stuck_column_is_told_and_not_driven_until_it_is_tried(soon, touched):
-    """Two windows find it, of which the first began before. Then it is tried, for a window each, and told meanwhile."""
+def test_a_stuck_column_is_reported_and_not_driven_until_it_is_tried(soon, touched):
+    """Two windows find it, of which the first began before. Then it is tried, for a window each, and
+    reported meanwhile."""
     skin = small(rows=2, columns=3, mask=((0, 0), (1, 0)), release_us=1.0, **SLOW)
     stuck = range(140, 3 * soon - 20)
     life = live(skin, lambda cycle: State([0, 0b100 * touched], 0b010 * (cycle in stuck)), 4 * soon)

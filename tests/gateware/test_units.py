@@ -88,7 +88,7 @@ class Inputs:
 @pytest.mark.whole
 @pytest.mark.parametrize("name", sample(SKINS, quick=["fail safe", "guard"]))
 def test_board_does_what_the_golden_model_says(name, monkeypatch):
-    """With guard lines for longer than the first hello. What is told of them is renewed every 256 us, so that reports
+    """With guard lines for longer than the first hello. Their faults are renewed every 256 us, so that reports
     and readings wait together."""
     monkeypatch.setattr(raster, "RETRY_BIT", 8)
     monkeypatch.setattr(guard, "RETRY_US", 2**8)

@@ -96,7 +96,7 @@ def test_a_wrong_reading_at_any_time_of_a_frame_leaves_the_next_touch_as_it_was(
 
 
 @pytest.mark.slow  # a board of its own; the compiled board over three tries is the golden model's below
-def test_a_column_that_stays_low_costs_its_own_cells_is_told_and_is_tried_every_66_ms():
+def test_a_column_that_stays_low_costs_its_own_cells_is_reported_and_is_tried_every_66_ms():
     """For 300 ms, while others are touched. It works again after the first try that finds it well."""
     ms, rng = FAST.clock_hz // 1000, np.random.default_rng(7)
     short, end = columns(5), 370

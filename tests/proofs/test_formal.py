@@ -30,7 +30,7 @@ LONG = {
     "backlog keeps each item, 16 items",
     "pins never meet, 2x1, shortest times",
     "pins never meet, 2x1, guard lines, row2col, shortest times",
-    "whole lines are not told, 3x2",
+    "whole lines are not reported, 3x2",
     "frames of a line reversal, 8x2",
     "a closed switch is reported, 8x4",
     "the next frame in time, 8x2, long times",

@@ -130,7 +130,7 @@ def test_without_a_stimulus_every_mutant_survives(sample):
 
 
 @pytest.mark.slow
-def test_what_time_was_too_short_for_is_open_and_neither_told_nor_proved(monkeypatch, sample):
+def test_what_time_was_too_short_for_is_open_and_neither_reported_nor_proved(monkeypatch, sample):
     monkeypatch.setattr(netlist, "draw", lambda *_: sample.mutants)
     found = campaign.examine("8x8", SAMPLE, 0, budget_s=0.0)
     assert [one.mutant for one in found if one.fate == "open"] == sample.left
@@ -160,10 +160,10 @@ def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=1)
     left = campaign.left_by(skin, mutants, stimuli.quick(skin))
     killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
-    told = [killed[stage] for stage in ("label", "link")]
-    proved = proof.equivalent(skin, [*told, *left[:6]], limit_s=4)
-    assert not any(proved[: len(told)])
-    assert any(proved[len(told) :])
+    noticed = [killed[stage] for stage in ("label", "link")]
+    proved = proof.equivalent(skin, [*noticed, *left[:6]], limit_s=4)
+    assert not any(proved[: len(noticed)])
+    assert any(proved[len(noticed) :])
 
 
 @pytest.mark.campaign

@@ -175,11 +175,11 @@ def test_a_simulated_board_says_its_speed_only_where_it_lags(board):
 
     with contactfpga.open(board.path, timeout=60.0) as port:
         source = BoardSource(port, "board")
-        assert dict(source.told())["lost"] == "nothing"
+        assert dict(source.facts())["lost"] == "nothing"
         source._pace = SimpleNamespace(share=1.0)
-        assert "simulated" not in dict(source.told())
+        assert "simulated" not in dict(source.facts())
         source._pace = SimpleNamespace(share=0.4)
-        assert dict(source.told())["simulated"].startswith("at 40% of real time")
+        assert dict(source.facts())["simulated"].startswith("at 40% of real time")
 
 
 def test_the_panel_names_no_color_twice():

@@ -136,7 +136,7 @@ def test_links_are_not_followed(tmp_path):
     assert target.read_text() == "x"
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path):
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(CacheError, match=r"cannot be used: .*; name another folder with CONTACTFPGA_CACHE"):
         cache.ready(tmp_path / "file" / "cache")
@@ -211,8 +211,8 @@ def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
     good = library.read_bytes()
     for what, damaged in damages():
         library.write_bytes(damaged(good))
-        told = f"contactfpga: {library} in the cache is damaged; it is made again\n"
-        assert answer(tmp_path) == (0, ["built", "42"], told), what
+        warning = f"contactfpga: {library} in the cache is damaged; it is made again\n"
+        assert answer(tmp_path) == (0, ["built", "42"], warning), what
         assert library.read_bytes() == good, what
     assert answer(tmp_path) == (0, ["42"], "")
 
@@ -225,13 +225,13 @@ def test_a_library_without_its_sum_is_built_again(tmp_path, damaged):
         total.unlink()
     else:
         total.write_bytes(damaged)
-    status, said, told = answer(tmp_path)
+    status, said, warning = answer(tmp_path)
     assert (status, said) == (0, ["built", "42"])
-    assert "is damaged; it is made again" in told
+    assert "is damaged; it is made again" in warning
     total.chmod(0o666)
-    status, said, told = answer(tmp_path)
+    status, said, warning = answer(tmp_path)
     assert status == 1
-    assert "can be written by others (mode 666)" in told
+    assert "can be written by others (mode 666)" in warning
 
 
 def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):

@@ -193,16 +193,16 @@ def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files
 
 
 def test_a_docstring_changes_no_kept_result(tmp_path, monkeypatch):
-    monkeypatch.setattr(sources, "_folders", lambda packages: {"told": tmp_path})
+    monkeypatch.setattr(sources, "_folders", lambda packages: {"package": tmp_path})
     text = '"""Of what."""\n\nWIDTH = 3\n"""How wide."""\n\n\ndef f():\n    """Say so."""\n    return """so"""\n'
     quiet = 'WIDTH = 3\ndef f():\n    return """so"""\n'
     louder = text.replace("How wide.", "How wide it is,\n\nin cells.").replace("Say so.", "Return so.")
 
     def key(text):
-        (tmp_path / "told.py").write_text(text)
+        (tmp_path / "package.py").write_text(text)
         sources._taken.clear()
         sources._undocumented.cache_clear()
-        return sources.digest("told", documented=False)
+        return sources.digest("package", documented=False)
 
     assert key(text) == key(quiet) == key(louder)
     assert len({key(text), key(text.replace("3", "4")), key(text.replace('"""so"""', '"""no"""'))}) == 3

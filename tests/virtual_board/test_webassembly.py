@@ -185,7 +185,7 @@ def copy(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("cut", [1, 4000, 70_000])
-def test_a_truncated_file_is_told_and_not_run(copy, capsys, cut):
+def test_a_truncated_file_is_reported_and_not_run(copy, capsys, cut):
     file = copy / "reference.wasm"
     file.write_bytes(file.read_bytes()[:-cut])
     assert webassembly.load(compiled.carried_key(Skin())) is None

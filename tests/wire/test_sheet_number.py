@@ -64,10 +64,10 @@ def test_requests_are_numbered_in_either_form(pulsed):
 
 
 def test_a_host_that_knows_no_sheets_takes_nothing_for_a_frame_and_counts_all():
-    told = hello(Facts(SKIN, (1, 2)))
+    reported = hello(Facts(SKIN, (1, 2)))
     frame = sheet_number.numbered(framing.seal(bytes(9) + b"\x50", SKIN.fingerprint[:2])[:-1], 1) + b"\0"
     before = Conversation("port")
-    assert before.receive(told + frame, 0.0) == []
+    assert before.receive(reported + frame, 0.0) == []
     assert (before.stats.before_hello, before.stats.hellos, before.stats.damaged.total()) == (2, 0, 0)
     after = Conversation("port")
     assert len(after.receive(protocol.encode_hello(SKIN) + frame, 0.0)) == 1

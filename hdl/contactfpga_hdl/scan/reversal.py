@@ -96,11 +96,11 @@ class ReversalScanner(wiring.Component):
         """Whether any fault is known now, but not in the last frame's flag, or the other way round. It is late by a
         clock, which is less than the least distance of two frames."""
         changed = Signal()
-        m.d.sync += changed.eq((self.stuck | self._told) ^ self.tag.fault)
+        m.d.sync += changed.eq((self.stuck | self._any_fault) ^ self.tag.fault)
         return changed
 
     @property
-    def _told(self) -> Value:
+    def _any_fault(self) -> Value:
         return self.faults.as_value().any() if "faults" in self.signature.members else Const(0)
 
     def _read_sheet(self, m: Module, pressed: Signal) -> Value:
@@ -181,7 +181,7 @@ class ReversalScanner(wiring.Component):
         if "faults" in self.signature.members:
             m.d.sync += counted.eq(Cat(cycle.begins, counted))
             with m.If(counted[1]):
-                m.d.sync += at_begin.eq(self._told)
+                m.d.sync += at_begin.eq(self._any_fault)
         m.d.comb += self.tag.fault.eq(self.tag.stuck.any() | at_begin)
         return toggles
 

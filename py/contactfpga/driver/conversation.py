@@ -317,8 +317,8 @@ class Conversation:
         plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
-            told = self._reader.take(plain)
-            return None if told is None else self._take_hello(told, now)
+            taken = self._reader.take(plain)
+            return None if taken is None else self._take_hello(taken, now)
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
             return self._take_lines(plain, hello)

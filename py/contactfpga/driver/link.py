@@ -104,8 +104,8 @@ class Link:
         with self.changed:
             queue = FrameQueue(maxsize, all_events, self._frames)
             self._queues.add(queue)
-            if all_events and self.conversation.lines.told:
-                queue.put(self.conversation.lines.told)
+            if all_events and self.conversation.lines.reported:
+                queue.put(self.conversation.lines.reported)
         return queue
 
     def leave(self, queue: object) -> None:

@@ -305,8 +305,8 @@ def describe(hello: Hello) -> str:
 
 def difference(hello: Hello, expected: Skin) -> str:
     """A board's Skin, and its difference from the expected one, in words."""
-    told, asked = _facts(hello), _expected_facts(expected)
-    differing = [f"{name} is {told[name]}, asked for was {asked[name]}" for name in told if told[name] != asked[name]]
+    sent, asked = _facts(hello), _expected_facts(expected)
+    differing = [f"{name} is {sent[name]}, asked for was {asked[name]}" for name in sent if sent[name] != asked[name]]
     if differing:
         what = "; ".join(differing)
     else:

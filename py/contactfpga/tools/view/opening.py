@@ -50,7 +50,7 @@ class View:
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
         self.cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
         self.panel = Panel(server, source, hand, self.cameras)
-        self._told_s = 0.0
+        self._written_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0
         if hand is not None:
@@ -62,8 +62,8 @@ class View:
             self._moment = moment
             self.stage.draw(moment)
             self.drawn += 1
-        if (now := time.monotonic()) - self._told_s > PANEL_S:
-            self._told_s = now
+        if (now := time.monotonic()) - self._written_s > PANEL_S:
+            self._written_s = now
             self.panel.write(self._moment)
 
 

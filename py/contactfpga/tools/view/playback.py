@@ -122,7 +122,7 @@ class Player(Playback[Zones]):
         self.meter.take(Batch.of(self._taken), Stats(), 0)
         return Moment(self._taken[-1], self._tracks)
 
-    def told(self) -> list[tuple[str, str]]:
+    def facts(self) -> list[tuple[str, str]]:
         return [("moment", f"{self.position_s:.3f} of {self.duration_s:.3f} s")]
 
     def begin(self, start_s: float) -> Iterator[tuple[float, Zones]]:
