@@ -73,6 +73,7 @@ class Top(wiring.Component):
         if self.skin.dual and not self.copy:
             return self._compared()
         m = Module()
+        # Pipeline, from the sheet to the line
         scan = self._put(m, "scan", self.derived.scan.load_gateware()(self.skin))
         rows = self._debounced(m, scan)
         items, summary = self._zones(m, rows) if self.derived.report.zones else self._bitmap(m, rows)
@@ -84,6 +85,7 @@ class Top(wiring.Component):
         m.d.sync += self._restarts.eq(scan.upset | link.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
+        # Pins and faults
         self._connect_sheet(m, scan)
         units = self._units(m, request, link) if self.skin.units else None
         self._watch_faults(m, scan, packer, units)
@@ -92,6 +94,7 @@ class Top(wiring.Component):
         if self.skin.self_test:
             wiring.connect(m, scan.slots, link.slots)
             m.d.comb += scan.command.eq(request.command & (request.what == SELF_TEST))
+        # Requests and tags
         m.d.comb += [
             scan.request.eq(request.received),
             scan.heard.eq(request.heard),
@@ -103,6 +106,7 @@ class Top(wiring.Component):
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
         ]
+        # Optional parts of the scan
         if moves_sample(self.derived):
             m.d.comb += [scan.moves.eq(request.command & (request.what == SAMPLE_AT)), scan.clocks.eq(request.value)]
         if self.derived.scan.waits:

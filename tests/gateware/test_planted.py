@@ -102,7 +102,7 @@ FAULTS = {
     "the highest bit of the kind is ignored": Fault("link/request.py", "with m.If(bit >= protocol.FLAG_BITS):",
         "with m.If((bit >= protocol.FLAG_BITS) & (bit != 7)):",
         f"{GATEWARE}/test_request.py::test_no_other_kind_is_taken"),
-    "a bit of the check is ignored": Fault("link/request.py", "return crc == 0", "return crc[:15] == 0",
+    "a bit of the check is ignored": Fault("link/request.py", "checked = crc == 0", "checked = crc[:15] == 0",
         f"{GATEWARE}/test_request.py::test_each_bit_that_a_wrong_check_leaves_counts"),
     "what the link finds does not restart the board": Fault("top.py", "scan.upset | link.upset", "scan.upset",
         f"{GATEWARE}/test_top.py::test_a_register_that_turns_by_itself_starts_all_but_the_transmitter_anew"),

@@ -72,6 +72,7 @@ class Records(wiring.Component):
         hands = waits & ~reads  # the halves change places
         owes = owed | waits & ~hands
         keeps = self.item.end & (self.send | owes)
+        # Half that is filled
         m.submodules.store = store = memory.Memory(shape=word_bits(self.derived), depth=2 << len(place), init=[])
         write = store.write_port()
         m.d.comb += [
@@ -79,9 +80,11 @@ class Records(wiring.Component):
             write.addr.eq(Cat(place, ~half ^ hands)),
             write.data.eq(Mux(self.item.end, self._closing(m, self.taken & keeps), self.item.data)),
         ]
+        # Half that is read
         self._read(m, store.read_port(), half, reads, hands, end)
         with m.If(hands):
             m.d.sync += [waits.eq(0), half.eq(~half)]
+        # Frame that waits
         with m.If(self.taken):
             m.d.sync += [
                 place.eq(Mux(self.item.end, 0, place + 1)),

@@ -47,10 +47,12 @@ class Checks(wiring.Component):
         m = Module()
         skin, guard_reads = self.skin, self.columns[-1]
         m.submodules.told = told = LineFaults(skin)
+        # Turns
         m.d.sync += [
             self.of_rows.eq(self.of_rows ^ self.starts),
             self.asked.eq((self.asked | self.due) & ~self.starts),
         ]
+        # Results
         m.d.comb += [
             self.of_guard.eq(self.checked & ~self.of_rows),
             told.rows.eq(~self.rows),
