@@ -49,7 +49,7 @@ class Reporter(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         report_due = Signal()
-        is_slot = Signal() if self._slot else Const(0)
+        is_slot = Signal(name="is_slot") if self._slot else Const(0)
         # Digit: of the report under way, or the one to compare
         watch = Signal((len(self._report) - 1).bit_length())
         at = Signal.like(watch)

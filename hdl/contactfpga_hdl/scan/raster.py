@@ -217,23 +217,23 @@ class Scanner(wiring.Component):
         from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin
-        m.submodules.told = told = LineFaults(skin)
+        m.submodules.line_faults = line_faults = LineFaults(skin)
         ended = Signal()
         at_end = Signal()
         m.d.comb += [
-            told.rows.eq((~sample.read[-1]).replicate(skin.rows)),
-            told.columns.eq(~sample.read),
-            told.stuck.eq(stuck.seen),
-            told.checks_rows.eq(Mux(sample.of_row & ~sample.early, Const(1, skin.rows) << sample.row, 0)),
-            told.checks_columns.eq(sample.of_driven & sample.is_guard),
-            told.checks_stuck.eq(stuck.take),
-            told.round.eq(stuck.take),
-            told.retry.eq(time[RETRY_BIT]),
-            self.faults.eq(told.faults),
+            line_faults.rows.eq((~sample.read[-1]).replicate(skin.rows)),
+            line_faults.columns.eq(~sample.read),
+            line_faults.stuck.eq(stuck.seen),
+            line_faults.checks_rows.eq(Mux(sample.of_row & ~sample.early, Const(1, skin.rows) << sample.row, 0)),
+            line_faults.checks_columns.eq(sample.of_driven & sample.is_guard),
+            line_faults.checks_stuck.eq(stuck.take),
+            line_faults.round.eq(stuck.take),
+            line_faults.retry.eq(time[RETRY_BIT]),
+            self.faults.eq(line_faults.faults),
         ]
         m.d.sync += ended.eq(stuck.take)
         with m.If(ended):
-            m.d.sync += at_end.eq(told.faults.as_value().any())
+            m.d.sync += at_end.eq(line_faults.faults.as_value().any())
         return at_end
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:

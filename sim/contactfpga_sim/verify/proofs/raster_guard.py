@@ -61,7 +61,7 @@ def _report(proof: Proof, inside: Inside, checked: Value, silent: Value, reporte
     with proof.m.If(checked & silent):
         proof.m.d.sync += ever.eq(1)
     proof.claim(reported | ~proof.before(checked & silent))
-    proof.claim(reported | ~proof.before(reported) | proof.before(checked & inside["told.renewing"]))
+    proof.claim(reported | ~proof.before(reported) | proof.before(checked & inside["line_faults.renewing"]))
     proof.claim(ever | ~reported)
 
 

@@ -122,7 +122,7 @@ def silent(proof: Proof, **changes: Any) -> None:
     of_rows = proof.before(_inverted(sheet)) & ~_inverted(sheet)
     guard = sheet.pressed_2[-1] | faults.stuck[-1]
     pressed, read = sheet.pressed_2.bit_select(x, 1), sheet.read_2.bit_select(y, 1)
-    renews = sheet.inside["checks.told.renewing"]
+    renews = sheet.inside["checks.line_faults.renewing"]
     for line, checked, answers in (
         (faults.columns.bit_select(x, 1), of_columns, pressed),
         (faults.rows.bit_select(y, 1), of_rows, read | guard),
