@@ -59,7 +59,7 @@ class Watched:
 
 
 def packed(skin, timeline, clocks, monkeypatch):
-    """By clock what the packer takes."""
+    """Items that the packer takes, by clock."""
     noted = {}
 
     class Noting(Packer):
@@ -94,7 +94,7 @@ def word(fields, values):
 
 
 def offered(skin, noted, takes):
-    """In each clock the word on offer as (data, last), or None: docs/ip.md in Python."""
+    """Word on offer in each clock as (data, last), or None: docs/ip.md in Python."""
     filling, reading, waiting, out = [], [], None, None
     number, owed, seen = 0, False, []
     for clock, taken in enumerate(takes):
@@ -134,18 +134,18 @@ class Played:
             place += port.bits
 
     def levels(self, name):
-        """Of a port in each clock."""
+        """Levels of a port in each clock."""
         place, mask = self._places[name]
         return [one >> place & mask for one in self.words]
 
     def records(self):
-        """As :func:`offered`."""
+        """Record words in each clock, as :func:`offered`."""
         some = (self.levels(f"m_axis_records_t{name}") for name in ("valid", "data", "last"))
         return [(data, bool(last)) if valid else None for valid, data, last in zip(*some, strict=True)]
 
 
 def frames(rng, skin):
-    """Cells that change about every scan, as (clock, cells)."""
+    """Random cells that change about every scan, as (clock, cells)."""
     scan = skin.derived.frame_clocks
     at = ip.RESET + 10
     for _ in range(FRAMES):
@@ -181,7 +181,7 @@ def stalling(seed):
 
 
 def numbers(skin, words):
-    """Of the frames that these words close."""
+    """Numbers of the frames that these words close."""
     fields = ip.closing_fields(skin)
     low = sum(bits for name, bits in fields.items() if name == "time")
     return [data >> low & 0xFFFF for data, last in words if last]
@@ -226,8 +226,8 @@ def test_the_exported_file_does_the_same_in_every_clock(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["moments", "on change"])
 def test_a_reader_that_never_takes_keeps_its_frame_and_holds_up_nothing(name):
-    """It takes all again in the end: the frame that it was offered, then the newest one, whose number says how many
-    were replaced."""
+    """A reader that takes no words until the end gets the frame that it was offered first, then the newest one, whose
+    number says how many were replaced."""
     skin = SKINS[name]
     begins = FRAMES * skin.derived.frame_clocks // 2
     waited, _ = play(skin, 3, lambda clock: clock >= begins)

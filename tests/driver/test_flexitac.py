@@ -109,7 +109,8 @@ def test_a_request_is_answered_by_a_frame_that_began_later(simulated):
 
 
 def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated):
-    """Else a reader in the network would know no times after a break, and get no frames any more."""
+    """The port sends hellos unrequested; without them, a reader in the network would know no times after a break and
+    would get no more frames."""
     hellos = simulated.stats.hellos
     for _ in range(200):
         assert simulated.clock() - simulated.next().time_us / 1e6 == pytest.approx(7.0, abs=0.01)
@@ -119,7 +120,8 @@ def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated
 
 
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
-    """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
+    """One of 2,000 bytes is lost, so that one of four frames of 514 bytes is damaged: these are lost, and no other is
+    shifted."""
     touch = Touch((8, 16))
     with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames, stats = frames_of(board, sheet, touch, 60), board.stats

@@ -158,8 +158,8 @@ def test_a_hello_that_repeats_another_number_is_none_of_ours():
 
 
 def test_a_random_number_does_not_continue_what_was_sent_of_late():
-    """Of two frames that waited in the board while the hello went ahead, one may carry an older number with the same
-    lowest bits, and the other one the next of these."""
+    """A random number never has the lowest bits of a recent one if the next number's were sent since: two frames that
+    waited in the board while the hello went ahead could carry them."""
     for seed in range(300):
         requests, lows = Requests(random.Random(seed)), []
         for turn in range(6):

@@ -21,7 +21,7 @@ SKINS = (Skin(name="chest", row_drive="74hc595", column_read="74hc165"), Skin(na
 
 
 class Sheet(DirectPort):
-    """One of the sheets; its packets say no number yet."""
+    """One of the sheets on a port; its packets have no number yet."""
 
     def __init__(self, number, skin):
         super().__init__(skin)
@@ -88,7 +88,7 @@ def opened(line, number, baud=3_000_000):
 
 
 def test_threads_that_wait_for_their_sheets_all_get_their_frames(line):
-    """While another one opens and closes them."""
+    """Each thread gets its sheet's frames while another thread opens and closes sheets."""
     boards = [opened(line, number) for number in (0, 1)]
     found, done = [[], []], threading.Event()
 

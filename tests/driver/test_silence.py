@@ -163,7 +163,8 @@ def test_a_frame_that_waits_too_long_is_not_the_latest(board, port):
 
 
 def test_a_frame_that_waited_on_its_way_is_not_the_latest(board, port):
-    """As after a network, or this program, stood still: it came just now, and was scanned long ago."""
+    """After the network or this program stood still, a frame that has just come but was scanned long ago is not the
+    latest."""
     for _ in range(10):
         board.next()
     late, port.dead = port.frame(), True
@@ -210,7 +211,8 @@ def test_deadlines_that_cannot_be(board, deadline_s):
 
 
 def test_with_a_keep_alive_the_deadline_has_to_be_longer():
-    """With its Skin known by what that says, else by the longest that there is."""
+    """A deadline below the keep-alive is refused: with a known Skin by its keep-alive, otherwise by the longest that
+    there is."""
     skin = contactfpga.Skin(send="on_change", keep_alive_ms=20.0)
     for given, least_s in ((skin, 0.02), (None, 0.1)):
         with contactfpga.open(Ticking(skin), given) as board:

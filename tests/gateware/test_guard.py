@@ -89,7 +89,7 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
 
 
 def reported_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
-    """What the scanner tells of its lines in each cycle."""
+    """The scanner's fault word in each cycle."""
     dut = Scanner(skin)
     sim, sheet = bench(dut), InputDriver(skin, timeline)
     watched = sim.watch(dut.faults)
@@ -105,7 +105,7 @@ def reported_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[i
 
 
 def changes(words) -> list[tuple[int, int]]:
-    """Those of (cycle, word) that differ from the one before; the first one from 0."""
+    """The (cycle, word) pairs that differ from the one before; the first is compared with 0."""
     found, before = [], 0
     for cycle, word in words:
         if word != before:
@@ -122,7 +122,7 @@ def golden(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]
 
 @pytest.fixture
 def soon(monkeypatch):
-    """What is reported is renewed every 512 us."""
+    """Reports of faulty lines are renewed every 512 us."""
     monkeypatch.setattr(raster, "RETRY_BIT", 9)
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
 
@@ -144,7 +144,8 @@ BREAKS = Skin(rows=3, columns=4, report="cells", settle_us=10, release_us=2, **T
 
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
 def test_each_single_break_at_each_place_is_reported_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
-    """Whatever is pressed. Cut in any clock of a frame; mended, and reported no more after the clock toggles next."""
+    """Any switches may be pressed. Each line is cut in any clock of a frame, then mended, and its report ends after the
+    clock toggles next."""
     monkeypatch.setattr(raster, "RETRY_BIT", RETRY_BIT)
     skin, rng = BREAKS.replace(diodes=diodes), np.random.default_rng(7)
     frame, retry = facts(skin).scan_clocks, 1 << RETRY_BIT
@@ -173,7 +174,8 @@ def test_a_whole_sheet_is_never_reported_whatever_is_pressed(bench, rng):
 
 
 def test_what_is_reported_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
-    """Checks, rounds and turns at random, many in the same clock; against what the checks were, looked up."""
+    """Checks, rounds and toggles at random, many in the same clock, against reports looked up in the history of
+    checks."""
     skin, cycles = SKINS["masked"], 6_000
     rows, columns = skin.rows, skin.columns
     ports = {"rows": rows, "columns": columns, "stuck": columns + 1, "checks_rows": rows, "checks_columns": 1,

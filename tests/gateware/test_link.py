@@ -62,7 +62,7 @@ def hello_of(skin, digits=(0,) * 16):
 
 
 def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, after=400):
-    """Puts the frames through; returns the bytes' sink and the items' source."""
+    """Feed the frames to the link; returns the bytes' sink and the items' source."""
     dut, sim = bench_of_skin
     size = ITEM_BYTES[skin.report]
     words = [word for frame in frames for word in (*frame.items, 1 << 8 * size)]
@@ -250,8 +250,8 @@ def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
 
 
 def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng):
-    """Of a scan that waits. Turns of the clock's bit come in any clock, most of them as it is decided whether a frame
-    is sent; the first frame is."""
+    """Link of a scan that waits: the clock's bit toggles in any clock, mostly as it is decided whether a frame is sent;
+    the first frame is sent."""
     skin, cycles = Skin(scan="reversal", precharge_us=1.0, send="on_change", keep_alive_ms=6.0), 6_000
     decide = [int(rng.random() < 0.2) for _ in range(cycles)]
     wanted = {name: [int(rng.random() < 0.03) for _ in range(cycles)] for name in ("changed", "requested")}
@@ -291,7 +291,7 @@ def test_readings_go_after_each_four_frames_that_follow_one_another(bench):
 
 
 def test_carries_that_come_in_one_clock_are_both_counted(bench):
-    """Those of the frames sent and of the epoch, through a carry into a second digit."""
+    """Carries of the sent frames and of the epoch in the same clock, through a second digit, are both counted."""
     dut, count = odometer.Odometer(), 130
     sim = bench(dut)
     for pulses in (dut.sent, dut.epoch):

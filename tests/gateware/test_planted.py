@@ -143,7 +143,8 @@ FAULTS = {
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_planted_fault_is_noticed(name, tmp_path):
-    """Its test belongs to `make test`. A test that cannot be collected, or does not end, has noticed nothing."""
+    """The named test, which belongs to `make test`, fails with the fault. A test that cannot be collected or does not
+    end has noticed nothing."""
     fault = FAULTS[name]
     copy = tmp_path / "contactfpga_hdl"
     shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -159,5 +160,5 @@ def test_a_planted_fault_is_noticed(name, tmp_path):
 
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_can_be_planted(fault):
-    """Its text is in the source, once."""
+    """The replaced text is in the source once."""
     assert fault.planted()

@@ -26,7 +26,7 @@ SLOW = {"clock_hz": 1_000_000, "baud": 100_000, "precharge_us": 1.0, "settle_us"
 
 @dataclass
 class Life:
-    """What a scanner with guard lines did, cycle by cycle."""
+    """Pins, reports and rows of a scanner with guard lines, cycle by cycle."""
 
     words: list[int]
     """What is reported: rows lowest, then columns, then stuck columns."""
@@ -176,8 +176,8 @@ def test_a_whole_sheet_is_never_reported_whatever_is_pressed(bench, soon, rng):
 
 @pytest.mark.parametrize(("project_us", "clocks"), [(1.0, 43), (0.7, 36)])
 def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project_us, clocks):
-    """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7
-    clocks after the touch, in place of 3 clocks."""
+    """A check of an untouched sheet delays a touch: at worst ``contact`` comes after settle and projection time and 7
+    clocks, not 3 clocks."""
     monkeypatch.setattr(reversal, "CHECK_BIT", 4)
     monkeypatch.setattr(reversal_guard, "CHECK_BIT", 4)
     skin = small(rows=2, columns=2, settle_us=0.5, project_us=project_us, precharge_us=0.25, guard=True)

@@ -16,8 +16,8 @@ from contactfpga_sim.model.golden import guard
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """What is done to the sheet: bit c of ``cells[r]`` is a closed switch; ``lifted`` rows read touched though nothing
-    feeds them; ``stuck`` columns read pressed."""
+    """State of the simulated sheet: bit c of ``cells[r]`` is a closed switch; ``lifted`` rows read touched though
+    nothing feeds them; ``stuck`` columns read pressed."""
 
     cells: list[int]
     stuck: int = 0
@@ -57,7 +57,7 @@ class Sheet:
 
 @dataclasses.dataclass
 class Life:
-    """What a scanner did."""
+    """Levels and rows of a scanner, cycle by cycle."""
 
     sheet: Sheet
     slots: list[Slot]
@@ -196,7 +196,8 @@ def test_a_scan_waits_for_rows_and_frames_with_its_lines_safe_and_loses_nothing(
 
 @pytest.mark.parametrize("fields", STALLS, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
 def test_rows_that_read_touched_for_no_reason_cost_slots_and_change_nothing_else(rng, fields):
-    """By coupling, for instance. What is read comes from slots, and an untouched row in one has no cell."""
+    """A row that reads touched without a touch, by coupling for instance, gets a slot, and its cells come from that
+    slot."""
     skin = small(**fields)
     at = changing(rng, skin, CYCLES + 1, lifts=True)
     life = live(skin, at, CYCLES)
@@ -286,7 +287,8 @@ def test_a_stuck_column_is_reported_and_not_driven_until_it_is_tried(soon, touch
 
 @pytest.mark.parametrize("clocks", range(1, 9))
 def test_a_column_that_reads_pressed_for_up_to_eight_clocks_is_driven_on(rng, clocks):
-    """At rest and in frames, from any clock on."""
+    """A column is still driven after it read pressed for at most eight clocks, at rest and in frames, from any clock
+    on."""
     skin = small(rows=2, columns=2, release_us=1.0, **SLOW)
     starts = list(itertools.accumulate(rng.randrange(80, 130) for _ in range(20)))
     wrong = {start + more: 1 << rng.randrange(2) for start in starts for more in range(clocks)}
@@ -296,7 +298,8 @@ def test_a_column_that_reads_pressed_for_up_to_eight_clocks_is_driven_on(rng, cl
 
 
 def test_a_touch_of_a_column_that_was_let_go_is_seen_when_it_is_tried(soon):
-    """The pressed switch pulls it to its row's level meanwhile, as if it were still stuck."""
+    """A touch keeps a released column at its row's level, as if it were still stuck, and is seen when the column is
+    driven again."""
     skin = small(rows=2, columns=2, release_us=1.0, **SLOW)
     life = live(skin, lambda cycle: State([0b01 * (cycle >= 300), 0], 0b01 * (20 <= cycle < 200)), 2 * soon)
     assert not life.sheet.columns[300] & 1

@@ -11,8 +11,8 @@ SAMPLED = (4, 5, 104)
 
 
 def reported(bench, bit_clocks, levels, idle=3):
-    """What the receiver tells of levels that start in cycle ``idle``: (cycle, level) of each data bit, cycles of good
-    stop bits, and of bad ones."""
+    """Run the receiver on levels that start in cycle ``idle``; returns (cycle, level) of each data bit, and the cycles
+    of good and of bad stop bits."""
     dut = Receiver(bit_clocks)
     sim = bench(dut)
     levels = [1] * idle + levels + [1] * 12 * bit_clocks

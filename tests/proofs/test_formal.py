@@ -87,7 +87,8 @@ def test_a_planted_bug_breaks_the_claim(case, bug):
 
 @pytest.mark.parametrize("case", upset.CASES, ids=lambda case: case.size)
 def test_each_register_that_turns_by_itself_is_found(case):
-    """Of those that are watched. Nothing else shows that they are, as none turns in other tests."""
+    """Each watched register is flipped and found. Nothing else shows that they are watched, as none flips in other
+    tests."""
     assert {bug.name: case.run_with(bug).outcome for bug in case.bugs} == dict.fromkeys(
         (bug.name for bug in case.bugs), "counterexample"
     )

@@ -41,7 +41,7 @@ def sample():
 
 @pytest.mark.slow
 def test_short_stimuli_kill_most_mutants(sample, record_property):
-    """Not even counting those that are no change, which only a proof can tell."""
+    """Short stimuli kill most mutants, even if equivalent mutants, which only a proof can tell, count as alive."""
     assert len(sample.left) <= 0.25 * SAMPLE
     record_property("cases", SAMPLE)
 
@@ -89,7 +89,8 @@ def test_no_noise_comes_where_pulses_are_bits():
     ],
 )
 def test_stimuli_of_units_notice_amounts_one_off_and_thresholds_without_a_bit(monkeypatch, skin, wrong):
-    """Sum 2 of this Skin never reaches 2**15. Its thresholds may have more bits."""
+    """Stimuli reach amounts at a threshold and one beside it. Sum 2 of this Skin never reaches 2**15, but its
+    thresholds may have more bits."""
     skin = OPTIONS[skin][0]
     timeline, cycles = stimuli.thresholds(skin, 240)
     asked = heard(timeline.received, facts(skin).bit_clocks, commands=True).requests

@@ -181,7 +181,7 @@ print(native.load(native.Model("the answer", "label.cpp", "answer", None)).answe
 
 
 def answer(folder):
-    """What a process says that loads a library from the cache, and makes it there is none."""
+    """Status and output of a process that loads a library from the cache, and makes it if there is none."""
     environment = os.environ | {"CONTACTFPGA_CACHE": str(folder)}
     command = [sys.executable, "-c", ANSWER]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=250, check=False)

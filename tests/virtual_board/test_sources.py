@@ -83,7 +83,7 @@ def _own_memory(monkeypatch):
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """All sources, to be changed."""
+    """A copy of all sources, which the test may change."""
     folder = tmp_path_factory.mktemp("copy")
     for package, inside in PACKAGES.items():
         ignored = shutil.ignore_patterns("__pycache__")
@@ -92,7 +92,7 @@ def copy(tmp_path_factory):
 
 
 def run(folder, code, *arguments, said="", **environment):
-    """What Python says with the packages of ``folder``."""
+    """Output of Python with the packages of ``folder``."""
     path = os.pathsep.join(str(folder / inside) for inside in PACKAGES.values())
     environment = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"} | environment
     command = [sys.executable, "-c", code, *map(str, arguments)]

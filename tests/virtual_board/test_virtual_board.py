@@ -83,8 +83,7 @@ def test_cells_of_another_size_are_refused():
 
 
 def read_until(path, enough):
-    """What a client reads that opens the port and stays until these bytes are ``enough``: as long as a busy machine
-    takes."""
+    """Bytes that a client reads until they are ``enough``, for as long as a busy machine takes."""
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
         tty.setraw(port)
@@ -194,7 +193,7 @@ def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
 
 
 def test_signals_within_the_handler_of_another_end_it_too():
-    """One comes at each line of the handler, with all that it calls."""
+    """A second signal at each line of the handler of the first, or of functions that it calls, ends the board too."""
     board = PtyBoard(SLOW)
 
     def again(*_):
