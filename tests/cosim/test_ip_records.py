@@ -35,7 +35,7 @@ FRAMES = 24
 
 
 @dataclasses.dataclass
-class Packed:
+class PackedItem:
     """What the golden model's packer takes in a clock: an item, or with it None the end mark of a frame. Without a
     closing word neither: a restart, which drops the frame that is being filled."""
 
@@ -44,7 +44,7 @@ class Packed:
     sent: bool = False
 
 
-class Watched:
+class WatchedQueue:
     """A queue in front of the golden model's packer, whose items are noted."""
 
     def __init__(self, queue, noted):
@@ -55,7 +55,7 @@ class Watched:
 
     def take(self, cycle, item):
         self._queue.take(cycle, item)
-        self._noted[cycle] = Packed(item)
+        self._noted[cycle] = PackedItem(item)
 
 
 def packed(skin, timeline, clocks, monkeypatch):
@@ -64,7 +64,7 @@ def packed(skin, timeline, clocks, monkeypatch):
 
     class Noting(Packer):
         def __init__(self, facts, link, queue):
-            super().__init__(facts, link, Watched(queue, noted))
+            super().__init__(facts, link, WatchedQueue(queue, noted))
 
         def _is_sent(self, items, taken):
             zones = len(items.records) if skin.report != "cells" else 0
@@ -76,7 +76,7 @@ def packed(skin, timeline, clocks, monkeypatch):
                 "fault": items.scan.fault,
                 "motion": items.scan.motion,
             }
-            noted[taken] = Packed(None, closing, super()._is_sent(items, taken))
+            noted[taken] = PackedItem(None, closing, super()._is_sent(items, taken))
             return noted[taken].sent
 
     monkeypatch.setattr(sys.modules["contactfpga_sim.model.golden.predict"], "Packer", Noting)
@@ -119,7 +119,7 @@ def offered(skin, noted, takes):
 
 
 @dataclasses.dataclass
-class Played:
+class CoreRun:
     """A core that was simulated in Amaranth's simulator."""
 
     ports: list[ip.Port]
@@ -164,7 +164,7 @@ def play(skin, seed, takes, received=()):
     timeline = Timeline([(clock, cells, None) for clock, cells in given], list(received))
     words = ip.simulated(skin, core, ports, timeline, clocks, lambda clock: (clock % 3 == 0, taken[clock]))
     late = Timeline([(clock - ip.RESET, cells, None) for clock, cells in given])
-    return Played(ports, words, taken), late
+    return CoreRun(ports, words, taken), late
 
 
 def stalling(seed):
@@ -276,10 +276,10 @@ def test_records_that_come_at_any_time_go_out_as_frames(seed):
             comes, sent, item = rng.random() < 0.3, rng.random() < 0.5, rng.randrange(1 << 16)
             restarts = not comes and rng.random() < 0.02
             if restarts:
-                noted[clock], left = Packed(None), 0
+                noted[clock], left = PackedItem(None), 0
             if comes:
                 closing = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
-                noted[clock] = Packed(item) if left else Packed(None, closing, sent)
+                noted[clock] = PackedItem(item) if left else PackedItem(None, closing, sent)
                 ctx.set(dut.tag.time, closing["time"])
                 ctx.set(dut.summary, {"zones": closing["zones"], "cells": closing["cells"]})
             ctx.set(dut.restart, restarts)

@@ -59,7 +59,7 @@ def test_silence(board):
     assert "doctor" in str(caught.value)
 
 
-class Unasked(DirectPort):
+class RepeatingPort(DirectPort):
     """A port in simulated time that says the same over and over, and answers nothing."""
 
     def __init__(self, data):
@@ -84,7 +84,7 @@ class Unasked(DirectPort):
     ids=["noise", "hellos", "frames without a hello"],
 )
 def test_what_comes_in_place_of_frames_is_reported(data, error, said):
-    with pytest.raises(contactfpga.ReadTimeout, match=said) as caught, contactfpga.open(Unasked(data)) as opened:
+    with pytest.raises(contactfpga.ReadTimeout, match=said) as caught, contactfpga.open(RepeatingPort(data)) as opened:
         opened.read()
     assert type(caught.value) is error
 

@@ -204,10 +204,10 @@ board.read()
 @pytest.mark.slow
 def test_a_body_in_a_child_is_closed(tmp_path):
     program = """
-from two_links import Plugged
+from two_links import PluggedPorts
 from contactfpga.robot.body import Body
 from contactfpga.robot.body import OpenBody
-body = OpenBody(Body.load(port), opened=Plugged().opened)
+body = OpenBody(Body.load(port), opened=PluggedPorts().opened)
 snapshots = body.subscribe()
 body.read(60)
 

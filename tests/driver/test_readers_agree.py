@@ -13,7 +13,7 @@ from wire import digits, seal
 import contactfpga
 from contactfpga.driver import native
 from contactfpga.driver.conversation import frames_in
-from contactfpga.driver.native import Unsettled
+from contactfpga.driver.native import NewestUnknown
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
 from contactfpga.zones.zone import Zones
@@ -137,7 +137,7 @@ class Newest:
     def newest(self, link, queue):
         try:
             found = link._newest(queue)
-        except Unsettled:
+        except NewestUnknown:
             found = None
         if isinstance(found, Zones):
             self.shown += 1

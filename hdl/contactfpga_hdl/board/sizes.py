@@ -78,7 +78,7 @@ class Netlists:
 
     @classmethod
     def of(cls, component: Callable[[], wiring.Component]) -> Netlists:
-        return cls(_rtlil(component()), _rtlil(Registered(component())))
+        return cls(_rtlil(component()), _rtlil(RegisterWrapper(component())))
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
@@ -167,7 +167,7 @@ def _limited() -> dict[str, Any]:
     return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S + 10))}
 
 
-class Registered(wiring.Component):
+class RegisterWrapper(wiring.Component):
     """A component between registers, with two pins: a wide component has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):

@@ -353,13 +353,13 @@ class Port:
         self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`Unsettled` if received
+        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`NewestUnknown` if received
         packets have to be taken first. Not thread-safe.
         """
         found = self._library.newest(self._address, packets, self._newest_at)
         if found <= 0:
             if found:
-                raise Unsettled
+                raise NewestUnknown
             return None
         values = _NEWEST_AND_FRAME.unpack_from(self._newest_view)
         frame = self._frame(values[8:], _NEWEST.size + 2 * FIELDS.itemsize)
@@ -377,5 +377,5 @@ class Port:
         return frame_of(fields, np.ndarray(shape, np.int64, copied), self._decodes[0].sheet)
 
 
-class Unsettled(Exception):
+class NewestUnknown(Exception):
     """The newest frame is unknown until received packets are taken."""

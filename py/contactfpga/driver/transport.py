@@ -139,11 +139,11 @@ def _quieten(library: str) -> None:
         logger.setLevel(logging.WARNING)
 
 
-class Named(Protocol):
+class HasName(Protocol):
     name: str
 
 
-OPEN_PORTS: weakref.WeakSet[Named] = weakref.WeakSet()
+OPEN_PORTS: weakref.WeakSet[HasName] = weakref.WeakSet()
 
 
 def user_of(name: str) -> str:
