@@ -1,4 +1,4 @@
-"""Results that are kept by what they were made of."""
+"""The cache of results: its key covers every input."""
 
 import pytest
 
