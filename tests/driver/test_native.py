@@ -17,6 +17,7 @@ import pytest
 from fake_board import background, wait_until
 
 import contactfpga
+import hatch_build
 from contactfpga.driver import health, native
 from contactfpga.driver.native_link import NativeLink
 
@@ -140,7 +141,8 @@ def test_frames_come_while_no_python_thread_runs(board):
 
 
 def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
-    """So a board that sends more than Python decodes fills no ring with frames that grow old."""
+    """Undecoded packets stay with the operating system, so that a board that sends more than Python decodes fills no
+    ring with frames that grow old."""
     master, slave = os.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)
@@ -172,7 +174,8 @@ def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
 
 
 def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(board):
-    """Even where it tells more of the clocks: each comes in another piece of their fit."""
+    """`latest` is quick while a thread works through old frames, even if each frame starts another piece of the clock's
+    fit."""
     with opened(board) as host:
         host.read(LONG)
         board.answers = False
@@ -191,3 +194,12 @@ def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(b
         with pytest.raises(contactfpga.ReadTimeout):
             host.next(0.01)
         assert host.stats.frames == count + 3
+
+
+def test_a_library_of_older_sources_is_not_used(monkeypatch, tmp_path):
+    (tmp_path / "older.c").write_text("int cfpga_open(void) { return 0; }")
+    command = [*hatch_build.compiler(), "-shared", "-fPIC", "-o", str(tmp_path / "older.so"), str(tmp_path / "older.c")]
+    subprocess.run(command, check=True)
+    monkeypatch.setattr(native, "LIBRARY", tmp_path / "older.so")
+    monkeypatch.setattr(native, "library", lambda: native.Library(native.LIBRARY))
+    assert native.missing().endswith("install the package again")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import errors, kept
+from contactfpga_sim.apps import errors, result_cache
 from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.model.scenes.families import placements
 
@@ -50,6 +50,6 @@ def _wrong(skin: Skin, cover: Cover | None, drawn: Drawn, first: int) -> int:
         looks = (errors.look(scene, 0.0, skin, cover) for scene in scenes)
         return sum(len(errors.method_zones(cells, skin)) != len(there) for cells, there in looks)
 
-    key = f"{kept.made_by(__name__, skin)} {drawn} {SEED} {first} {cover}"
-    found: int = kept.kept("miscounts", key, new)
+    key = f"{result_cache.made_by(__name__, skin)} {drawn} {SEED} {first} {cover}"
+    found: int = result_cache.cached("miscounts", key, new)
     return found
