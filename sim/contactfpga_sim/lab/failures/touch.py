@@ -93,7 +93,7 @@ def _light(radius_mm: float, force_n: float, rng: np.random.Generator, count: in
     skin, cells = STARTER.skin, []
     for _ in range(count):
         x, y = _middle(skin.pitch_x_mm, rng)
-        finger = Contact(shape=contacts.disc(radius_mm), x_mm=x, y_mm=y, force_n=force_n)
+        finger = Contact(shape=contacts.disc(radius_mm), body=None, x_mm=x, y_mm=y, force_n=force_n)
         cells.append(Scene((finger,)).pressed(0.0, skin, COVER))
     return [_counted(zones, each, 1) for zones, each in zip(seen(skin, np.array(cells)), cells)]
 
