@@ -167,7 +167,7 @@ def test_a_point_is_what_other_code_finds():
     counted, missed, away = [], [], []
     for scene in placements("fingers", 60, 3, skin):
         pressed = scene.on_cover(skin, one.cover)  # its patches may reach over the sheet's edge
-        closed = cells.forces_n(pressed.loads(0.0)) >= cells.thresholds_n
+        closed = cells.forces_n(pressed.loads(0.0)) >= cells.drawn(pressed.drawn)
         labels, count = ndimage.label(closed)
         found = [(pitch * x, pitch * y) for y, x in ndimage.center_of_mass(closed, labels, range(1, count + 1))]
         there = [(contact.x_mm, contact.y_mm) for contact in pressed.truth(0.0, skin).contacts]
