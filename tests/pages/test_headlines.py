@@ -35,7 +35,7 @@ def worst_and_median(kit: str, stage: str) -> tuple[float, float]:
 def peaks(sheet: str, body: str) -> dict[str, str]:
     """Worst / mean in N by the heading of a way, at the lower speed, from the file of all rows of the arm's page."""
     with open(ROOT / "docs/tables/arm-kits.csv", newline="") as file:
-        (row, _) = [row for row in csv.DictReader(file) if (row["sheet"], row["body"]) == (sheet, body)]
+        row, *_ = [row for row in csv.DictReader(file) if (row["sheet"], row["body"]) == (sheet, body)]
     return {head.partition(":")[0]: value for head, value in row.items()}
 
 
