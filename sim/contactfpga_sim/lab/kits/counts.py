@@ -29,8 +29,7 @@ FINGERS = Drawn("two to five fingers of 2 to 20 N", "fingers", 4000, (2.0, 20.0)
 SCENES = (
     FINGERS,
     Drawn("two to five fingers of 1 to 3 N", "fingers", 4000, (1.0, 3.0)),
-    Drawn("two to five fingers of 2 N", "fingers", 4000, (2.0, 2.0)),
-    Drawn("two fingers 10 mm apart, 5 to 20 N", "pair", 4000),
+    Drawn("two fingers 10 mm apart, 5 to 20 N", "pair", 1000),
     Drawn("a forearm, 5 to 50 N", "bumper", 1000),
     Drawn("the edge of a box, 10 to 60 N", "edge", 1000),
     Drawn("a flat hand, 20 to 80 N", "palm", 500),
