@@ -212,7 +212,7 @@ def test_a_file_with_a_cover(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text(COVERED)
     assert Skin.load(path) == Skin(rows=8)
-    assert load_cover(path) == Cover("bonded", 0.004, Switch(0.5))
+    assert load_cover(path) == Cover("foam", 0.004, Switch(0.5))
     path.write_text(Skin(rows=8).to_toml() + write_cover(Cover(share=0.25)))
     assert (Skin.load(path), load_cover(path)) == (Skin(rows=8), Cover(share=0.25))
     path.write_text("rows = 8")
