@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from bumpers import (
-    exerted,
-    in_cone,
-    scattered,
-    solved,
-)
+from bumpers import exerted, in_cone, scattered, solved
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
@@ -70,13 +65,12 @@ def lies_between(interval, outer, inner, close):
         assert high_inside is not None
 
 
-@pytest.mark.parametrize(("count", "cones", "close"), [(2, False, 1e-6), (2, True, 1e-3), (3, True, 1e-3)])
+@pytest.mark.parametrize(("count", "cones", "close"), [(2, False, 1e-6), (3, True, 1e-3)])
 @given(seed=SEEDS, friction=st.sampled_from([0.1, 0.5, 1.2]))
 @example(seed=1143701, friction=0.5)  # 0.05 % of friction change this interval by 0.5 %
 @settings(max_examples=8, deadline=None)
 def test_intervals_are_those_of_linear_programs(count, cones, close, seed, friction):
-    if cones:
-        pytest.importorskip("clarabel", reason="extra haptics")
+    pytest.importorskip("clarabel", reason="extra haptics")
     rng = np.random.default_rng(seed)
     points, normals = scattered(rng, count)
     share = 0.6 if count > 2 else 1.0

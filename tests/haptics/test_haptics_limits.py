@@ -1,9 +1,11 @@
-"""The most contacts that a file may hold, and contacts nearly at one place."""
+"""The time that forces take, the most contacts that a file may hold, and contacts nearly at one place."""
 
 import time
+import timeit
 
 import numpy as np
 import pytest
+from bumpers import exerted, hexapod, scattered, solved
 
 from contactfpga.robot.haptics import contacts
 from contactfpga.robot.haptics.contact import Touch
@@ -24,6 +26,16 @@ def scene(rng, count, around_m, friction, sideways=0.0):
     six = np.concatenate([forces.sum(0), np.cross(places, forces).sum(0)])
     touches = [Touch(tuple(place), tuple(normal), friction) for place, normal in zip(places.tolist(), normals.tolist())]
     return Wrench(tuple(six[:3].tolist()), tuple(six[3:].tolist())), touches
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_frame_takes_no_longer_than_some_small_solves(count):
+    """At most 0.3 ms where numpy solves six equations in 6.7 us, with as much again for a busy machine."""
+    points, normals = scattered(np.random.default_rng(1), count)
+    loaded, six = exerted(points, -9 * normals, hexapod(60, 0.075).noise), np.random.default_rng(1).random((6, 6))
+    works = (lambda: solved(points, normals, loaded), lambda: np.linalg.solve(six, six[0]))
+    takes, solve = (min(timeit.repeat(work, timer=time.thread_time, repeat=20, number=100)) for work in works)
+    assert takes / solve < 2 * 300 / 6.7
 
 
 @pytest.mark.parametrize("sideways", [0.0, 0.3])

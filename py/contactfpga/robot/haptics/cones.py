@@ -28,8 +28,9 @@ CHI2_1 = 3.841458820694124
 KNOWN = 1e-9
 """Share below which a singular value, or an effect of the null space, is 0."""
 
-PUSH_COUNTS = 1e-7
-"""Weight of a squared push against a squared force along the surface, among forces with the same wrench."""
+FEW_COUNT, MANY_COUNT = 1e-7, 1e-2
+"""Weights of a squared push against a squared force along the surface, among forces with the same wrench, for up to two
+contacts and for more, which else squeeze the link hard to drag a little less."""
 
 ROUNDING = 1e-12
 """Share of the squared wrench by which forces may fit worse than the best, and count as good."""
@@ -59,9 +60,7 @@ class _Space:
         """(3k,): the forces with these (rank,) shares of ``right`` and the smallest parts along the surface."""
         if not len(self.null):
             return np.asarray(shares @ self.right)
-        weighted = np.array(self.right)
-        weighted[:, 1::3] *= PUSH_COUNTS
-        weighted[:, 2::3] *= PUSH_COUNTS
+        weighted = self.right / _weights(self.right.shape[1] // 3)
         return np.asarray(np.linalg.solve(weighted @ self.right.T, shares) @ weighted)
 
 
@@ -70,6 +69,10 @@ def _used(frictions: Floats) -> NDArray[np.bool_]:
     used = np.repeat(frictions > 0, 3)
     used[::3] = True
     return used
+
+
+def _weights(contacts: int) -> Floats:
+    return np.tile([FEW_COUNT if contacts <= 2 else MANY_COUNT, 1.0, 1.0], contacts)
 
 
 class Cones:
@@ -113,7 +116,7 @@ class Cones:
             return forces if not worse or self._is_nearest(forces) else self._nearest(), False
         if not worse and self._allowed(forces):
             return forces, False
-        found = self._smallest(shares / self._space.values)
+        found = self._smallest(shares / self._space.values) if len(self.null) else None
         return (forces, True) if found is None else (found, False)
 
     def _least_squares(self) -> Floats:
@@ -149,7 +152,7 @@ class Cones:
     def _smallest(self, shares: Floats) -> Floats | None:
         """The forces in the cones with these shares and the smallest parts along the surface; None without any."""
         program = _Program(self._frictions, float(np.abs(shares).max()), same=(self._space.right, shares))
-        return program.least(np.diag(np.tile([PUSH_COUNTS, 1.0, 1.0], len(self._frictions))), np.zeros(len(self._used)))
+        return program.least(np.diag(_weights(len(self._frictions))), np.zeros(len(self._used)))
 
     def ranges(self, forces: Floats, frictions: Sequence[float], beyond: bool, exact: bool) -> list[Interval]:
         """Least and largest of each push; None if unbounded.

@@ -123,7 +123,7 @@ class Contact:
         With the units' noise it contains the push in at least 95 of 100 cases
         (:mod:`contactfpga.robot.haptics.cones`); without (:attr:`Wrench.noise` None) it is the range of all forces
         that friction allows and that exert exactly this wrench. Raises :class:`~contactfpga.MissingExtra` without
-        Clarabel, which one contact near 0 N may need, and two or more do.
+        Clarabel, which two contacts or more need, and one that nearly lifts or slips.
         """
         return None if self._intervals is None else self._intervals()[self._number]
 

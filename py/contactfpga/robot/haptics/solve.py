@@ -149,9 +149,14 @@ class _Frame:
         columns = [(*axis, *cross(touch.point_m, axis)) for touch, axes in zip(touches, self._axes) for axis in axes]
         self._matrix = np.array(columns).T  # (6, 3k)
         self._frictions = [0.0 if known else touch.friction for touch in touches]
-        self._solve(_exact(wrench, touches) if wrench.noise is None else wrench.noise.root)
-        if wrench.noise is not None and any(touch.point_sigma_m for touch in touches):
-            self._solve(wrench.noise.widened(self._moved()).root)
+        noise = wrench.noise
+        unsure = noise is not None and any(touch.point_sigma_m for touch in touches)
+        if unsure and len(touches) == 1 and not known:
+            self._forces = [wrench.force_n]
+        else:
+            self._solve(_exact(wrench, touches) if noise is None else noise.root)
+        if noise is not None and unsure:
+            self._solve(noise.widened(self._moved()).root)
 
     def _solve(self, root: Floats) -> None:
         self._cones = Cones(root @ self._matrix, root @ self._wrench.array, self._frictions)
