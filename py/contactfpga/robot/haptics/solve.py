@@ -151,9 +151,8 @@ class _Frame:
         self._frictions = [0.0 if known else touch.friction for touch in touches]
         noise = wrench.noise
         unsure = noise is not None and any(touch.point_sigma_m for touch in touches)
-        if unsure and len(touches) == 1 and not known:
-            self._forces = [wrench.force_n]
-        else:
+        self._forces: list[Vector] = [wrench.force_n]  # that of one contact, whose place widens the moment
+        if not unsure or len(touches) > 1 or known:
             self._solve(_exact(wrench, touches) if noise is None else noise.root)
         if noise is not None and unsure:
             self._solve(noise.widened(self._moved()).root)
@@ -161,7 +160,7 @@ class _Frame:
     def _solve(self, root: Floats) -> None:
         self._cones = Cones(root @ self._matrix, root @ self._wrench.array, self._frictions)
         self._sizes, self._beyond = self._cones.nearest()
-        self._forces: list[Vector] = [
+        self._forces = [
             (
                 a * first[0] + b * second[0] + c * third[0],
                 a * first[1] + b * second[1] + c * third[1],
