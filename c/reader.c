@@ -179,32 +179,34 @@ static void copy_bytes(const port *p, uint64_t from, size_t count, uint8_t *out)
     memcpy(out + first, p->bytes, count - first);
 }
 
-/* Whether the decoder's packet is a whole frame of the sheet. */
-static bool read_frame(port *p, size_t length, contactfpga_frame *frame, uint32_t *time_us) {
-    contactfpga_reader *decoder = &p->decoder;
-    if (!p->known || length < CONTACTFPGA__CHECK_BYTES + 2) return false;
+/* Fields of the decoder's packet, if it is a whole frame of its sheet. */
+static bool read_frame(contactfpga_reader *decoder, size_t length, fields *out) {
+    if (length < CONTACTFPGA__CHECK_BYTES + 2) return false;
     size_t stuffed = length - CONTACTFPGA__CHECK_BYTES;
     uint8_t check[CONTACTFPGA__CHECK_BYTES], last = decoder->packet[stuffed - 1];
     if (last >> 4 != CONTACTFPGA__KIND_ZONES + decoder->hello.report) return false;
     uint16_t crc = contactfpga__crc16(0xFFFF, decoder->hello.fingerprint, 2);
     contactfpga__check_bytes(contactfpga__crc16(crc, decoder->packet, stuffed), check);
     if (memcmp(check, decoder->packet + stuffed, sizeof check)) return false;
+    contactfpga_frame frame;
+    uint32_t time_us;
     length = contactfpga__unstuff(decoder->packet, stuffed);
-    return length && decoder->packet[length - 1] == last
-        && contactfpga__read_frame(decoder, length, frame, time_us) == CONTACTFPGA__FINE;
+    if (!length || decoder->packet[length - 1] != last
+        || contactfpga__read_frame(decoder, length, &frame, &time_us) != CONTACTFPGA__FINE) return false;
+    *out = (fields){1, time_us, frame.sequence, frame.heard, frame.cells, frame.zones, frame.overwritten, frame.flags,
+        frame.items};
+    return true;
 }
 
-static void keep_records(port *p, const contactfpga_frame *frame) {
-    for (uint16_t i = 0; i < frame->items; i++) {
-        contactfpga_zone zone;
-        contactfpga__read_zone(&p->decoder, i, &zone);
-        int64_t *record = p->records + 4 * (p->head.records++ % RECORDS);
-        bool divided = p->decoder.hello.report == CONTACTFPGA_BARYCENTER;
-        record[0] = zone.area;
-        record[1] = divided ? zone.x : zone.sum_x;
-        record[2] = divided ? zone.y : zone.sum_y;
-        record[3] = zone.turned;
-    }
+/* A record of the frame that was read, in four words. */
+static void read_record(const contactfpga_reader *decoder, uint16_t index, int64_t *out) {
+    contactfpga_zone zone;
+    contactfpga__read_zone(decoder, index, &zone);
+    bool divided = decoder->hello.report == CONTACTFPGA_BARYCENTER;
+    out[0] = zone.area;
+    out[1] = divided ? zone.x : zone.sum_x;
+    out[2] = divided ? zone.y : zone.sum_y;
+    out[3] = zone.turned;
 }
 
 /* The packet that ends before ``end``. */
@@ -212,17 +214,14 @@ static packet decode(port *p, uint64_t end) {
     packet found;
     memset(&found, 0, sizeof found);
     found.size = (int64_t)(end - p->begun);
-    contactfpga_frame frame;
-    uint32_t time_us;
-    if (found.size <= CONTACTFPGA_PACKET_BYTES) {
+    if (p->known && found.size <= CONTACTFPGA_PACKET_BYTES) {
         copy_bytes(p, p->begun, (size_t)found.size, p->decoder.packet);
-        bool room = read_frame(p, (size_t)found.size, &frame, &time_us);
-        while (room && p->head.records + frame.items - p->tail.records > RECORDS) room = drop_oldest(p);
-        if (room) {
-            found.frame = (fields){1, time_us, frame.sequence, frame.heard, frame.cells, frame.zones, frame.overwritten,
-                frame.flags, frame.items};
-            keep_records(p, &frame);
-        }
+        bool room = read_frame(&p->decoder, (size_t)found.size, &found.frame);
+        uint16_t items = (uint16_t)found.frame.items;
+        while (room && p->head.records + items - p->tail.records > RECORDS) room = drop_oldest(p);
+        for (uint16_t i = 0; room && i < items; i++)
+            read_record(&p->decoder, i, p->records + 4 * (p->head.records++ % RECORDS));
+        if (!room) memset(&found.frame, 0, sizeof found.frame);
     }
     found.records_end = p->head.records;
     return found;
@@ -489,21 +488,46 @@ void cfpga_feed(port *p, const uint8_t *data, size_t count, double at_s) {
     pthread_mutex_unlock(&p->lock);
 }
 
-/* What frames are from now on, and those that were not taken yet. */
-void cfpga_sheet(port *p, const sheet *told) {
-    pthread_mutex_lock(&p->lock);
-    contactfpga_hello *hello = &p->decoder.hello;
+static void set_sheet(contactfpga_reader *decoder, const sheet *told) {
+    contactfpga_hello *hello = &decoder->hello;
     memset(hello, 0, sizeof *hello);
     hello->rows = (uint8_t)told->rows, hello->columns = (uint8_t)told->columns;
     hello->connectivity = (uint8_t)told->connectivity, hello->report = (uint8_t)told->report;
     hello->fraction_bits = (uint8_t)told->fraction_bits, hello->closed = told->closed;
     hello->zone_capacity = (uint16_t)told->zone_capacity;
     hello->fingerprint[0] = (uint8_t)told->prefix, hello->fingerprint[1] = (uint8_t)(told->prefix >> 8);
+    decoder->widths = contactfpga__widths(hello);
+}
+
+/* Packets without a port, each with its delimiter: the fields of each, where the records of each begin and the last one's
+ * end, and the records. */
+void cfpga_decode(const sheet *told, const uint8_t *data, size_t count, fields *found, int64_t *starts, int64_t *records) {
+    contactfpga_reader decoder;
+    set_sheet(&decoder, told);
+    const uint8_t *zero, *end = data + count;
+    for (*starts = 0; data < end && (zero = memchr(data, 0, (size_t)(end - data))); data = zero + 1, starts++, found++) {
+        size_t length = (size_t)(zero - data);
+        memset(found, 0, sizeof *found);
+        if (length > CONTACTFPGA_PACKET_BYTES) length = 0;
+        memcpy(decoder.packet, data, length);
+        read_frame(&decoder, length, found);
+        for (uint16_t i = 0; i < found->items; i++, records += told->closed ? 4 : 3) {
+            int64_t record[4];
+            read_record(&decoder, i, record);
+            memcpy(records, record, (told->closed ? 4 : 3) * sizeof *record);
+        }
+        starts[1] = *starts + found->items;
+    }
+}
+
+/* What frames are from now on, and those that were not taken yet. */
+void cfpga_sheet(port *p, const sheet *told) {
+    pthread_mutex_lock(&p->lock);
+    if (told->known) set_sheet(&p->decoder, told);
     bool held = held_back(p);
     p->known = told->known;
     if (held && p->descriptor >= 0) wake_thread();
     p->columns = told->closed ? 4 : 3;
-    if (p->known) p->decoder.widths = contactfpga__widths(hello);
     p->clean = false;
     /* What waits is decoded again where it is read as bytes: see native.py. */
     for (uint64_t i = p->tail.packets; i < p->head.packets; i++) p->packets[i % PACKETS].frame.valid = 0;

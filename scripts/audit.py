@@ -28,7 +28,7 @@ from pathlib import Path
 
 import verification
 
-from contactfpga_sim.lab import beside, writer
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 from contactfpga_sim.verify.mutants import campaign
@@ -134,10 +134,10 @@ def table(study: Study, name: str, until: float) -> Finding:
     if time.monotonic() >= until:
         return Finding(what, f"not looked at: {TABLES_S} s were over", ended=False)
     try:
-        part = StudyRun(study).call(study.sections[name].sample)
+        part = StudyRun(study).sampled(name)
     except ImportError as error:
         return Finding(what, f"not looked at: {error}")
-    text = beside.whole(ROOT / "docs" / page, name)
+    text = writer.whole(ROOT / "docs" / page, name)
     agrees = f"\n{part}\n" in f"\n{text}\n"
     return Finding(what, f"agrees, {len(part.splitlines())} lines" if agrees else "differs", wrong=not agrees)
 

@@ -1,4 +1,4 @@
-"""The tables of docs/ros.md. Makes an environment with ROS 2 for each distribution where there is none
+"""Prints the tables of docs/ros.md. Makes an environment with ROS 2 for each distribution where there is none
 (scripts/ros_environment.py)."""
 
 from __future__ import annotations
@@ -154,3 +154,7 @@ def spent_us(action: Callable[[], object]) -> float:
             action()
         found.append((time.thread_time() - begun) / (ROUNDS // 5) * 1e6)
     return min(found)
+
+
+if __name__ == "__main__":
+    print(shown_table(), costs_table(), sep="\n\n")

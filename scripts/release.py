@@ -54,6 +54,7 @@ def make(tag: str | None) -> None:
     if tag is not None and tag != (version := f"v{run('import contactfpga; print(contactfpga.__version__)', tree)}"):
         sys.exit(f"the tag is {tag}, the package's version {version}; change one of them")
     run("from contactfpga_sim import carried; carried.check()", tree)
+    command("-m", "contactfpga_sim.lab", "--check", tree=tree, cwd=tree)
     bitstreams(tree, RELEASE / "kits")
     dist = RELEASE / "dist"
     wheels(tree, dist, needed=tag is not None)

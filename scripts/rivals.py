@@ -45,7 +45,7 @@ from contactfpga.tools.console.interrupt import guarded
 from contactfpga_hdl.board.sizes import DEVICES, SEEDS, Device, Netlists, Registered
 from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_hdl.board.tools import BitstreamFailed
-from contactfpga_sim.lab import size
+from contactfpga_sim.apps import size
 from contactfpga_sim.lab.writer import table_of
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.golden import all_departures

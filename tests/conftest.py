@@ -118,7 +118,7 @@ STEP = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "only the tests of what reads a sheet, and every third case of each"
     parser.addoption("--quick", action="store_true", help=text)
-    text = "every third case of each slow or campaign test, one at least; three numbers in a row draw all of them"
+    text = "every third slow or campaign case of each file; three numbers in a row draw all of them"
     parser.addoption("--third", type=int, metavar="NUMBER", help=text)
     text = "leave out what passed in this run, whose results --junitxml wrote"
     parser.addoption("--passed", type=Path, metavar="FILE", help=text)
@@ -136,8 +136,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
     quick = config.getoption("quick")
     third = 0 if quick else config.getoption("third")
-    whole = _kept_whole if quick else _fast
-    kept = items if third is None else _third(items, third, whole)
+    kept = items if third is None else _third(items, third, _test_of if quick else _slow_file_of)
     if config.getoption("passed"):
         passed = _passed(config.getoption("passed"))
         kept = [item for item in kept if _result(item.nodeid) not in passed]
@@ -147,19 +146,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item in left]
 
 
-def _kept_whole(item: pytest.Item) -> bool:
-    return item.get_closest_marker("whole") is not None
+def _test_of(item: pytest.Item) -> str:
+    return item.nodeid if item.get_closest_marker("whole") else item.nodeid.partition("[")[0]
 
 
-def _fast(item: pytest.Item) -> bool:
-    return not any(item.get_closest_marker(name) for name in ("slow", "campaign"))
+def _slow_file_of(item: pytest.Item) -> str:
+    slow = any(item.get_closest_marker(name) for name in ("slow", "campaign"))
+    return item.nodeid.partition("::")[0] if slow else item.nodeid
 
 
-def _third(items: list[pytest.Item], number: int, whole: Callable[[pytest.Item], bool]) -> list[pytest.Item]:
-    """Every third case of each test, and one of a test with fewer than three; all cases where ``whole`` is true."""
+def _third(items: list[pytest.Item], number: int, group: Callable[[pytest.Item], str]) -> list[pytest.Item]:
+    """Every third case of each group, and one of a group with fewer than three."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        cases.setdefault(item.nodeid if whole(item) else item.nodeid.partition("[")[0], []).append(item)
+        cases.setdefault(group(item), []).append(item)
     return [item for found in cases.values() for item in found[number % min(STEP, len(found)) :: STEP]]
 
 

@@ -1,4 +1,6 @@
 """The public names of :mod:`contactfpga.tools.recordings`."""
 
-from contactfpga.tools.recordings import *
-from contactfpga.tools.recordings import __all__ as __all__
+from contactfpga.tools.recordings.recorder import Session
+from contactfpga.tools.recordings.recording import Recording
+
+__all__ = ["Recording", "Session"]

@@ -17,7 +17,7 @@ from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.tools.console import interrupt, outputs, tables
 from contactfpga.wire.protocol import Frame
-from contactfpga_sim.lab import pool
+from contactfpga_sim.apps import pool
 from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.golden import Timeline, Trace, predict

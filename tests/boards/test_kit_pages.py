@@ -18,7 +18,7 @@ from contactfpga.design.kits import KitError
 from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
-from contactfpga_sim.lab import latency
+from contactfpga_sim.apps.latency import board as latency
 from contactfpga_sim.lab.kits import predict
 from contactfpga_sim.model.board.compiled import CompiledBoard
 

@@ -17,13 +17,15 @@ from sample import sample
 from wire import FINGERPRINT, SHEET, digits, last_byte, old_frame, old_hello
 
 from contactfpga import Skin
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import FLAGS, may_number
 from contactfpga.wire.units import Sweep
+from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.golden.uart import pulsed
 
 SKINS = [
@@ -63,8 +65,8 @@ def by_python(data: bytes) -> list[str]:
     lines = []
     for piece in pieces(data):
         for event in talk.receive(piece, 0.0):
-            if isinstance(event, Arrival):
-                lines.append(frame_line(event))
+            if isinstance(event, Run):
+                lines += map(frame_line, event)
             elif isinstance(event, Faults):
                 lines.append(faults_line(event))
             elif isinstance(event, UnitSamples):
@@ -125,15 +127,15 @@ def faults_line(faults: Faults) -> str:
     )
 
 
-def frame_line(arrival: Arrival) -> str:
-    frame = arrival.zones.frame
+def frame_line(zones: Zones) -> str:
+    frame = zones.frame
     flags = sum(1 << bit for bit, name in enumerate(FLAGS) if name in frame.flags)
     items = frame.moments if frame.barycenters is None else frame.barycenters
     words = [",".join(map(str, row)) for row in items.tolist()]
     if frame.bitmap is not None:
         words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
     told = (frame.sequence, flags, frame.heard, frame.cells, frame.zones, frame.overwritten)
-    return " ".join(map(str, ("frame", arrival.zones.time_us, *told, *words)))
+    return " ".join(map(str, ("frame", zones.time_us, *told, *words)))
 
 
 def zones(rng, skin) -> list:
@@ -454,19 +456,19 @@ def test_barycenters_in_mm(tmp_path):
         board = ModelBoard(skin)
         board.moments = [(3, 40, 7), (4, 10, 6)]
         data = board.hello() + board.frame()
-        (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
+        (frame,) = frames_in(Conversation("", live=False).receive(data, 0.0))
         found = {tuple(map(float, line.split())) for line in by_c(mm, data)}
-        assert found == {(zone.x_mm, zone.y_mm) for zone in arrival.zones}
+        assert found == {(zone.x_mm, zone.y_mm) for zone in frame}
 
 
 def test_a_zone_over_the_seam_has_a_place_and_a_ring_has_none(tmp_path):
     board = ModelBoard(Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True))
     board.moments = [(3, 12, 7, 2), (7, 21, 7, 7), (4, 10, 6, 63)]
     data = board.hello() + board.frame()
-    (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
-    assert {zone.winding for zone in arrival.zones} == {"", "ring", "wound"}
+    (frame,) = frames_in(Conversation("", live=False).receive(data, 0.0))
+    assert {zone.winding for zone in frame} == {"", "ring", "wound"}
     mm = compiled_mm(tmp_path)
-    wanted = [f"{'nan' if zone.x_mm is None else repr(zone.x_mm)} {zone.y_mm!r}" for zone in arrival.zones]
+    wanted = [f"{'nan' if zone.x_mm is None else repr(zone.x_mm)} {zone.y_mm!r}" for zone in frame]
     found = [" ".join(repr(abs(float(word))) for word in line.split()) for line in by_c(mm, data)]
     assert sorted(found) == sorted(wanted)
 

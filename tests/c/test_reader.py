@@ -1,5 +1,6 @@
 """The thread in C that reads ports: under sanitizers, and packet by packet against the decoder in Python."""
 
+import itertools
 import shutil
 import subprocess
 from pathlib import Path
@@ -16,7 +17,7 @@ from contactfpga.driver import native
 from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.framing import PacketError
-from contactfpga.zones.run import frame_of
+from contactfpga.wire.protocol import frame_of
 
 STRESS = Path(__file__).with_name("reader_stress.c")
 OPTIONS = ["-std=c99", "-ffp-contract=off", "-pthread", f"-I{FOLDER}"]
@@ -70,6 +71,15 @@ def by_python(packet, widths, before):
         return fields(protocol.decode_frame(framing.unseal(packet, before), widths))
     except PacketError:
         return None
+
+
+def by_c(table, skin):
+    """The same of each packet."""
+    records = [table.records[start:end] for start, end in itertools.pairwise(table.starts)]
+    return [
+        fields(frame_of(row.item(), found, skin.sheet)) if row["valid"] else None
+        for row, found in zip(table.packets, records, strict=True)
+    ]
 
 
 def fields(frame):
@@ -126,12 +136,10 @@ def test_it_decodes_what_python_decodes_wherever_reads_end(stream):
         reads, begun, missing = port.take()
         assert (begun, missing) == (b"", 0)
         came += b"".join(reads.data_of(at) for at in range(len(reads)))
-        table = reads.decoded
-        for index, row in enumerate(table.packets):
-            records = table.records[table.starts[index] : table.starts[index + 1]]
-            found.append(fields(frame_of(row.item(), records, skin.sheet)) if row["valid"] else None)
-        sizes += reads._sizes.tolist()
+        found += by_c(reads.table, skin)
+        sizes += reads.sizes.tolist()
     packets = [packet for packet in data.split(b"\0")[:-1] if packet]
     assert came == data
     assert sizes == list(map(len, packets))
     assert found == [by_python(packet, widths, before) for packet in packets]
+    assert by_c(native.decode(packets, widths, before), skin) == found

@@ -16,7 +16,7 @@ from wire import Wire
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import pool
+from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.arm import report
 from contactfpga_sim.model.board import native
 
@@ -127,7 +127,7 @@ CASES = [
     *(["record", "--recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
     ["record", "--recover", "RECORDED", "--seconds", "1"],
     ["record", "--recover", "RECORDED", "--bytes-only"],
-    *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "NO_HELLO")),
     *(["record", name, "sim://"] for name in ("x.bin", "/no/folder/x.mcap", "x")),
     *(["record", "x.mcap", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     ["record", "x.mcap", "replay://NONE"],

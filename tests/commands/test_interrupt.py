@@ -139,7 +139,7 @@ def test_a_command_listens_even_where_its_shell_would_have_it_ignore_the_signal(
 
 WORKERS = """
 import os, subprocess, sys, time
-from contactfpga_sim.lab import pool
+from contactfpga_sim.apps import pool
 
 def work(number):
     subprocess.run(["sleep", "90"])

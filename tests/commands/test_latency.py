@@ -12,11 +12,11 @@ from reversal import FAST, small
 from contactfpga import examples
 from contactfpga.boards import BOARDS
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import latency
-from contactfpga_sim.lab.finger import host, stages
-from contactfpga_sim.lab.finger.host import HostShare
-from contactfpga_sim.lab.spread import MixedTimes
-from contactfpga_sim.lab.usb import BridgeSettings
+from contactfpga_sim.apps.latency import board as latency
+from contactfpga_sim.apps.latency import host, stages
+from contactfpga_sim.apps.latency.host import HostShare
+from contactfpga_sim.apps.latency.spread import MixedTimes
+from contactfpga_sim.apps.latency.usb import BridgeSettings
 
 FILE = str(examples() / "fast.toml")
 

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError
 from contactfpga.design.cover.task import Task
-from contactfpga.driver import mcap
 from contactfpga.inputs import array_file, tomlfile, values, xmlfile
 from contactfpga.robot.body import Body, BodyError, folds, packed, urdf
 from contactfpga.robot.body.folds import Folds
@@ -24,6 +23,7 @@ from contactfpga.skin.several import MOST_SHEETS, Several
 from contactfpga.surfaces import Mesh, SurfaceError, mesh, mesh_file
 from contactfpga.surfaces.laying import Triangles
 from contactfpga.tools.commands.haptics import reading
+from contactfpga.tools.recordings import mcap
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.model.scenes.file import SceneFile
 from contactfpga_sim.model.scenes.recordings import Recording

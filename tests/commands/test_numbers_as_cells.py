@@ -9,7 +9,7 @@ import pytest
 
 from contactfpga.inputs.array_file import ArrayFileError, read
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.model.scenes import scene
 from contactfpga_sim.model.scenes.cells import pressed
 from contactfpga_sim.model.scenes.recordings import Recording

@@ -8,7 +8,7 @@ import pytest
 from every_command import called, leaves, options
 
 from contactfpga.tools.console import outputs
-from contactfpga_sim.lab import pool
+from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.arm import pictures, sweep
 
 

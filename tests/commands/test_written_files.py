@@ -52,7 +52,7 @@ def picture(path):
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     pytest.importorskip("mcap")
-    from contactfpga.tools.recordings import Recording
+    from contactfpga.recordings import Recording
 
     folder = tmp_path_factory.mktemp("recorded")
     recorded(folder, bytes_only=True)

@@ -16,7 +16,7 @@ from zone_oracles import nearest, zones_by_scipy
 import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.apps import errors, speed
 from contactfpga_sim.model.board import replay
 from contactfpga_sim.model.golden import Timeline, predict, zones
 from contactfpga_sim.model.golden.facts import facts

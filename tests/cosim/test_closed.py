@@ -9,8 +9,8 @@ from sample import sample
 from contactfpga import Batch, Skin
 from contactfpga.tools import cli
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.wire.many import decode
 from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, unseal
+from contactfpga.wire.table import decode
 from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones

@@ -11,7 +11,7 @@ import pytest
 from amaranth.sim import Simulator
 from sample import sample
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga_hdl.core import Core
@@ -249,7 +249,7 @@ def test_both_streams_tell_of_the_same_zones_and_a_request_is_answered():
     some = (played.levels(f"m_axis_t{name}") for name in ("valid", "ready", "data"))
     events = Conversation("a core").receive(bytes(data for valid, ready, data in zip(*some) if valid & ready), 0.0)
     assert [event.heard > 0 for event in events if isinstance(event, Hello)] == [False, True]
-    sent = [event.zones.frame for event in events if isinstance(event, Arrival)]
+    sent = [zones.frame for zones in frames_in(events)]
     frames, records = {}, []
     for data, last in filter(None, played.records()):
         if last:

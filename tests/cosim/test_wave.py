@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from vcd import VCDWriter
 from vcd.reader import TokenKind, tokenize
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga_sim.model import golden
@@ -75,9 +75,7 @@ def test_the_line_carries_the_zone_that_is_pressed(written):
     events = conversation.receive(protocol.encode_hello(SMALL) + bytes([0, *data]), 0.0)
     cells = wave.finger(SMALL)
     rows, columns = np.nonzero(cells)
-    assert [event.zones.frame.moments.tolist() for event in events if isinstance(event, Arrival)][-1] == [
-        [len(rows), columns.sum(), rows.sum()]
-    ]
+    assert frames_in(events)[-1].frame.moments.tolist() == [[len(rows), columns.sum(), rows.sum()]]
     rows = signals["bench.top.row_cells"]
     pressed = {at(rows, when) for when, high in signals["bench.top.row_transfer"] if high}
     assert pressed == {0, *(int(sum(row << np.arange(5))) for row in cells if row.any())}

@@ -81,7 +81,7 @@ def test_only_files_are_replayed(tmp_path, kind):
     path = tmp_path / "x"
     {"fifo": os.mkfifo, "folder": os.mkdir, "device": lambda path: path.symlink_to("/dev/zero")}[kind](path)
     with pytest.raises(PortNotFound, match="not a regular file; is the path right"):
-        recording.open_recorded(f"replay://{path}")
+        contactfpga.open(f"replay://{path}")
 
 
 @pytest.mark.parametrize("link", ["same", "symlink", "hard link"])

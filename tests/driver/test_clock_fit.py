@@ -9,7 +9,7 @@ from study_pages import section
 
 import contactfpga
 from contactfpga.driver.clock import PIECE_S, ClockFit
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 from contactfpga_sim.lab.clock import tables
@@ -115,10 +115,9 @@ class Line:
         self.board, self.host = ModelBoard(SKIN), Conversation("x", live=live)
         self.late_s, self.begun_s = late_s, 1000.0
 
-    def send(self, data, runs=False):
+    def send(self, data):
         now = self.begun_s + self.board.time_us / 1e6 + self.late_s
-        take = self.host.receive_runs if runs else self.host.receive
-        found = [event if isinstance(event, Run) else event.zones for event in take(data, now) if is_frame(event)]
+        found = [event for event in self.host.receive(data, now) if isinstance(event, Run)]
         for _, hello in self.board.hear(self.host.data_to_send()):
             self.board.time_us += round(self.late_s * 1e6)
             found += self.send((self.board.hello() if hello else b"") + self.board.frame())
@@ -130,15 +129,11 @@ class Line:
         return self.send(b"")
 
 
-def is_frame(event):
-    return isinstance(event, (Arrival, Run))
-
-
 def test_a_board_that_is_asked_has_times_with_a_small_uncertainty():
     line = Line()
     line.ask()
     for _ in range(5000):
-        (zones,) = line.send(line.board.frame())
+        ((zones,),) = line.send(line.board.frame())
     truth = 1000.0 + zones.time_us / 1e6
     assert abs(zones.host_time_s - truth) < 0.001
     assert zones.host_sigma_s < 0.0005
@@ -153,7 +148,7 @@ def test_a_restart_of_the_board_begins_anew():
     line.begun_s += line.board.time_us / 1e6 + 0.3
     line.board.power_up()
     line.send(line.board.hello())
-    (zones,) = line.send(line.board.frame())
+    ((zones,),) = line.send(line.board.frame())
     assert line.host.stats.restarts == 1
     assert zones.host_time_s == pytest.approx(line.begun_s + zones.time_us / 1e6, abs=0.002)
 
@@ -162,10 +157,10 @@ def test_runs_and_batches_carry_the_same_times():
     line = Line()
     line.ask()
     line.send(b"".join(line.board.frame() for _ in range(50)))
-    found = line.send(b"".join(line.board.frame() for _ in range(200)), runs=True)
-    assert any(isinstance(one, Run) for one in found)
+    found = line.send(b"".join(line.board.frame() for _ in range(200)))
+    assert len(found) == 1
     batch = Batch.of(found)
-    single = [zones for one in found for zones in (one if isinstance(one, Run) else [one])]
+    single = frames_in(found)
     for name in ("host_time_s", "host_sigma_s", "arrived_s"):
         assert batch.frames[name].tolist() == [getattr(zones, name) for zones in single], name
     assert np.allclose(np.diff(batch.frames["host_time_s"]), SCAN_US / 1e6, atol=1e-6)

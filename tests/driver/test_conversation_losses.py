@@ -1,11 +1,11 @@
 """What the conversation makes of losses, restarts and other Skins."""
 
 import pytest
-from model_board import SCAN_US, SKIN, Line, ModelBoard, arrived
+from model_board import SCAN_US, SKIN, Line, ModelBoard
 from wire import Wire, old_frame, old_hello
 
 import contactfpga
-from contactfpga.zones.run import Run
+from contactfpga.driver.conversation import frames_in
 
 
 def errors(events):
@@ -120,9 +120,9 @@ def test_a_run_ends_at_a_restart_whose_hello_is_lost(pieces):
     events = [
         event
         for piece in ((before + after,) if pieces == 1 else (before, after))
-        for event in line.host.receive_runs(piece, line.now)
+        for event in line.host.receive(piece, line.now)
     ]
-    assert sum(len(event) if isinstance(event, Run) else 1 for event in events) == 20
+    assert len(frames_in(events)) == 20
     assert line.stats.unexplained == 20
 
 
@@ -138,7 +138,7 @@ def test_frames_of_the_board_before_do_not_pass_after_another_bitstream_was_load
         torn = line.board.frame()[:cut]
         new = ModelBoard(SKIN.replace(pitch_x_mm=20.0))
         events = line.host.receive(torn + new.hello() + new.frame(), 0.0)
-        assert [zones[0].x_mm for zones in arrived(events)] == [50.0]
+        assert [zones[0].x_mm for zones in frames_in(events)] == [50.0]
         assert "now has a 16x16 Skin" in str(errors(events)[0])
 
 

@@ -8,7 +8,7 @@ from model_board import DirectPort, ModelBoard
 from wire import Wire, last_byte
 
 import contactfpga
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.wire import faults
 from contactfpga.wire.faults import Faults
 from contactfpga.zones.batch import Batch
@@ -41,7 +41,7 @@ class Line:
     def faults(self, flagged=True):
         """Of the next frame."""
         (event,) = self.give(self.board.frame(flags=FLAGGED if flagged else ()))
-        return event.zones.faults
+        return event[0].faults
 
 
 @pytest.mark.parametrize(
@@ -176,18 +176,13 @@ def test_frames_in_runs_have_the_faults_of_those_one_by_one():
             flagged = not flagged
         packets.append(board.frame(flags=FLAGGED if flagged else ()))
     one, many = Conversation("x"), Conversation("x")
-    singles = [event.zones for event in one.receive(b"".join(packets), 0.0) if isinstance(event, Arrival)]
-    items, runs = [], 0
-    for start in range(0, len(packets), 50):
-        for event in many.receive_runs(b"".join(packets[start : start + 50]), 0.0):
-            runs += isinstance(event, Run)
-            if isinstance(event, (Run, Arrival)):
-                items.append(event if isinstance(event, Run) else event.zones)
-    spread = [zones for item in items for zones in (item if isinstance(item, Run) else [item])]
-    assert [said(zones) for zones in spread] == [said(zones) for zones in singles]
+    singles = [zones for packet in packets for zones in frames_in(one.receive(packet, 0.0))]
+    pieces = [b"".join(packets[start : start + 50]) for start in range(0, len(packets), 50)]
+    items = [event for piece in pieces for event in many.receive(piece, 0.0) if isinstance(event, Run)]
+    assert [said(zones) for zones in frames_in(items)] == [said(zones) for zones in singles]
     assert Batch.of(items).faults == tuple(zones.faults for zones in singles)
     assert {zones.faults for zones in singles} == {(), ("row 3 open",), ("column 2 stuck",), ("unnamed fault",)}
-    assert runs > 10
+    assert sum(len(run) > 8 for run in items) > 10
     assert np.array_equal(Batch.of(items).frames["fault"], ["fault" in zones.flags for zones in singles])
 
 
@@ -260,7 +255,7 @@ def test_the_sample_is_moved_by_a_command():
         with pytest.raises(ValueError, match="value of a command is -1"):
             board.sample_at(-1)
     with contactfpga.open(DirectPort(contactfpga.Skin())) as board:
-        with pytest.raises(contactfpga.NoSuchCommand, match='no sample at; build its Skin with report = "cells" and'):
+        with pytest.raises(contactfpga.NoSuchCommand, match=r'no sample at; build its Skin with report = "cells"$'):
             board.sample_at(17)
 
 

@@ -176,8 +176,8 @@ print(board.stats.bytes)
 def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
     pytest.importorskip("mcap", reason="the extra `record` is not installed")
     program = """
-from contactfpga.tools.recordings import Recording
-from contactfpga.tools.recordings.session import Session
+from contactfpga.recordings import Recording
+from contactfpga.recordings import Session
 session = Session(sys.argv[2])
 session.add(port, timeout=60)
 session.start()

@@ -207,15 +207,16 @@ def asked_by_a_flag(monkeypatch):
 
 def restart_by_the_sequence(monkeypatch):
     """4: a frame with the number 0 in the first second of every 16.8 is the first one since power-up."""
-    take_frame = Timeline.take_frame
+    take = Timeline.take
 
-    def guessed(self, frame, widths, now):
-        if self.before is not None and self._gap(frame) and frame.sequence == 0 and frame.time_us < 1_000_000:
+    def guessed(self, packets, widths, last, came_s):
+        sequence, time_us = packets["sequence"][0], packets["time_us"][0]
+        if self.before is not None and (sequence - self._next) % 256 and sequence == 0 and time_us < 1_000_000:
             self._next, self._last_us, self._time_us, self._epoch = 0, 0, None, 0
             self.before = None
-        return take_frame(self, frame, widths, now)
+        return take(self, packets, widths, last, came_s)
 
-    monkeypatch.setattr(Timeline, "take_frame", guessed)
+    monkeypatch.setattr(Timeline, "take", guessed)
 
 
 def no_bits_of_the_fingerprint(monkeypatch):
@@ -235,13 +236,13 @@ def no_bits_of_the_fingerprint(monkeypatch):
 def times_without_doubt(monkeypatch):
     """After any pause the time goes on by the bits that the frame carries."""
 
-    def explain(self, frame, now):
+    def explain(self, heard, time_us, sequence, now):
         if not self._known:
             return None
         if self._time_us is None:
             first_us = (self._epoch - 1) * (1 << 22)
-            return first_us + (frame.time_us - first_us) % (1 << 24)
-        return self._time_us + (frame.time_us - self._time_us) % (1 << 24)
+            return first_us + (time_us - first_us) % (1 << 24)
+        return self._time_us + (time_us - self._time_us) % (1 << 24)
 
     monkeypatch.setattr(Timeline, "_explain", explain)
 

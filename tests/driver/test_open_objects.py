@@ -8,8 +8,8 @@ import pytest
 from recorded_stream import StreamPort
 
 import contactfpga
+from contactfpga.recordings import Session
 from contactfpga.robot.body import Body
-from contactfpga.tools.recordings import Session
 
 
 @pytest.fixture

@@ -12,10 +12,10 @@ from wire import digits, seal
 
 import contactfpga
 from contactfpga.driver import native
+from contactfpga.driver.conversation import frames_in
 from contactfpga.driver.native import Unsettled
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
-from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 NAMES = [*SKINS, "guard", "units"]
@@ -42,8 +42,6 @@ def told(item):
     """All that a user can see of what came."""
     if isinstance(item, Zones):
         return repr((item.to_dict(), sorted(item.flags), item.sheet, item.frame.heard, item.suspects))
-    if isinstance(item, Run):
-        return [told(zones) for zones in item]
     return repr(item)
 
 
@@ -97,10 +95,9 @@ class Followers:
             case 0 | 1:
                 self.pop(self.rng.randrange(40))
             case 2 if not self.all_events:
-                found = [queue.pop_frames() for queue in self.queues]
-                flat = [[told(z) for one in some for z in (one if isinstance(one, Run) else [one])] for some in found]
-                assert flat[0] == flat[1]
-                self.seen += len(flat[0])
+                first, second = ([told(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
+                assert first == second
+                self.seen += len(first)
             case 3 if not self.all_events:
                 assert self.kept(thread) == self.kept(fast)
             case 4:
@@ -306,6 +303,40 @@ def test_neither_shows_a_frame_after_a_restart_as_the_one_after_a_wrap(pairs):
     newest.step()
     assert newest.seen == 2
     assert facts(pair.thread) == facts(pair.native)
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_reads_of_many_seconds_that_are_taken_together_say_the_same(pairs, asked):
+    """With a request that the board does not hear, which is sent again and again."""
+    pair, board = pairs(), ModelBoard(contactfpga.Skin())
+    pair.take(board.hello() + board.frame())
+    pair.pass_time()
+    looks = ask(pair, 100.0) if asked else []
+    for _ in range(12):
+        pair.now += 1.0
+        board.time_us += 1_000_000
+        pair.take(board.frame())
+    assert len(pair.sent()) > 30 or not asked
+    assert facts(pair.thread) == facts(pair.native)
+    assert pair.native.conversation.stats.frames == 13
+    assert not any(look() for look in looks)
+
+
+def test_frames_that_come_as_the_decoder_learns_of_their_sheet_are_not_lost(pairs, monkeypatch):
+    """In C they are no frames yet."""
+    pair, board = pairs(), ModelBoard(contactfpga.Skin())
+    core, take = pair.native._core, pair.native._core.take
+
+    def take_as_more_comes():
+        found = take()
+        core.feed(board.frame(), 0.0)
+        return found
+
+    pair.take(board.hello() + board.frame())
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(core, "take", take_as_more_comes)
+        pair.native.catch_up()
+    assert pair.native.conversation.stats.frames == 2
 
 
 def test_what_the_ring_overwrites_counts_as_lost(pairs):

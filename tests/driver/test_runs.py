@@ -12,15 +12,15 @@ from model_board import ModelBoard
 from sample import sample
 
 import contactfpga
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver import conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.driver.framequeue import FrameQueue
-from contactfpga.skin.derived import Widths
-from contactfpga.wire import framing, many, protocol
+from contactfpga.wire import table
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
-WITH_RUNS = ("moments", "barycenter", "odd", "large")
+LONG = 8
 
 
 def said(events):
@@ -29,7 +29,7 @@ def said(events):
         if isinstance(event, Run):
             yield from map(told, event)
         else:
-            yield told(event.zones) if isinstance(event, Arrival) else repr(event)
+            yield repr(event)
 
 
 def told(zones):
@@ -51,12 +51,14 @@ def told(zones):
         quick=[(name, number % 2 == 0) for number, name in enumerate(SKINS)],
     ),
 )
-def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng):
+def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng, monkeypatch):
+    """One side decodes in Python and takes each frame alone; the other decodes in C, where there is a library."""
     in_runs, answered = 0, set()
     for turn in range(2):
         known = 0
         history, stream, now = History(SKINS[name], rng), b"", 0.0
         one_by_one, in_many = (Conversation("x", None, live, random.Random(turn)) for _ in range(2))
+        one_by_one.decode = table.decode
         for _ in range(25):
             if rng.random() < 0.5:
                 assert one_by_one.ask(now, now + 1.0) == in_many.ask(now, now + 1.0)
@@ -65,16 +67,24 @@ def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng):
             stream += history.more(rng.choice([1, 20, 60]), asked)
             cut = rng.choice([1, len(stream) // 2, len(stream), len(stream)])
             data, stream = stream[:cut], stream[cut:]
-            alone, mixed = one_by_one.receive(data, now), in_many.receive_runs(data, now)
+            mixed = in_many.receive(data, now)
+            with monkeypatch.context() as alone_only:
+                alone_only.setattr(conversation, "run_ends", ends_of_single_frames)
+                alone = one_by_one.receive(data, now)
             assert list(said(mixed)) == list(said(alone))
             assert one_by_one.stats == in_many.stats
+            assert one_by_one.unused == in_many.unused
             assert state(one_by_one, name) == state(in_many, name)
-            in_runs += sum(len(event) for event in mixed if isinstance(event, Run))
+            in_runs += sum(len(event) for event in mixed if isinstance(event, Run) and len(event) >= LONG)
             known = check_answers(alone, mixed, known)
             answered.add((turn, known))
             now += rng.choice([0.001, 0.1, 0.1, 9.0])
-    assert (in_runs > 60) == (name in WITH_RUNS)
+    assert in_runs > 60
     assert len(answered) > 5
+
+
+def ends_of_single_frames(packets):
+    return [index + int(valid) for index, valid in enumerate(packets["valid"])]
 
 
 def state(host, name):
@@ -86,50 +96,15 @@ def state(host, name):
 
 
 def check_answers(alone, mixed, known):
-    """Runs answer nothing that the frame before them, which answered this, does not; what is answered at the end."""
-    answers = [event.answers for event in alone if isinstance(event, Arrival)]
-    place = 0
-    for event in mixed:
-        if isinstance(event, Arrival):
-            known, place = event.answers, place + 1
-            assert known == answers[place - 1]
-        elif isinstance(event, Run):
-            assert set(answers[place : place + len(event)]) == {known}
-            place += len(event)
+    """Of several frames none answers what the frame before them does not; what is answered at the end."""
+    answers = [run.answers for run in alone if isinstance(run, Run)]
+    for run in mixed:
+        if isinstance(run, Run):
+            assert {run.answers} == set(answers[: len(run)])
+            assert len(run) == 1 or run.answers == known
+            known, answers = run.answers, answers[len(run) :]
+    assert not answers
     return known
-
-
-@pytest.mark.parametrize("name", WITH_RUNS)
-def test_what_passes_in_a_table_is_what_passes_alone(name, rng):
-    """Damaged packets, resealed ones among them, and all the contents that cannot be."""
-    skin = SKINS[name]
-    widths, before = Widths(skin.sheet), protocol.check_prefix(skin)
-    board, packets = ModelBoard(skin), []
-    for _ in range(3000):
-        packet = random_frame(board, rng)[:-1]
-        if rng.random() < 0.5:
-            data = bytearray(packet[: -rng.choice([0, 3]) or None])
-            data[rng.randrange(len(data))] = rng.randrange(1, 256)
-            packet = bytes(data)
-            if len(packet) < len(data) + 1:  # the check is right, the rest may be anything
-                packet = packet[:-3] + framing.check_bytes(packet[:-3], before)
-        packets.append(packet)
-    table = many.decode(packets, widths, before)
-    passed = 0
-    for index, packet in enumerate(packets):
-        try:
-            frame = protocol.decode_frame(framing.unseal(packet, before), widths)
-        except protocol.PacketError:
-            assert not table.packets["valid"][index]
-            continue
-        passed += 1
-        fields = table.packets[index]
-        assert fields["valid"] == (len(packet) <= 257), "longer ones may hold a full block"
-        if not fields["valid"]:
-            continue
-        records = table.records[table.starts[index] : table.starts[index + 1]]
-        assert records.tolist() == (frame.moments if frame.barycenters is None else frame.barycenters).tolist()
-    assert 300 < passed < 2900
 
 
 @pytest.mark.parametrize("name", SKINS)
@@ -137,11 +112,10 @@ def test_a_batch_holds_what_its_frames_hold(name, rng):
     """Whether they came in runs or one by one."""
     board = ModelBoard(SKINS[name])
     stream = board.hello() + b"".join(random_frame(board, rng) for _ in range(400))
-    events = [event for event in Conversation("x").receive_runs(stream, 1.5) if isinstance(event, Arrival | Run)]
-    parts = [event.zones if isinstance(event, Arrival) else event for event in events]
-    assert any(isinstance(part, Run) for part in parts) == (name in WITH_RUNS)
-    batch = Batch.of(parts)
-    frames = [zones for part in parts for zones in (part if isinstance(part, Run) else [part])]
+    runs = [event for event in Conversation("x").receive(stream, 1.5) if isinstance(event, Run)]
+    assert max(map(len, runs)) >= LONG
+    batch = Batch.of([run[0] if len(run) == 1 else run for run in runs])
+    frames = frames_in(runs)
     for name in ("sequence", "time_us", "host_time_s", "total_zones", "pressed"):
         assert batch.frames[name].tolist() == [getattr(zones, name) for zones in frames], name
     assert np.diff(batch.starts).tolist() == [len(zones) for zones in frames]
@@ -155,15 +129,14 @@ def test_a_batch_holds_what_its_frames_hold(name, rng):
 # ---- the queue
 
 
-def runs_and_frames(rng, count):
-    """What a queue may get: frames alone, runs and errors, and the same in a plain list."""
+def runs_and_errors(rng, count):
+    """What a queue may get."""
     board = ModelBoard(SKINS["moments"])
     host = Conversation("x")
     host.receive(board.hello(), 0.0)
     for _ in range(count):
         stream = b"".join(board.frame() for _ in range(rng.choice([1, 3, 60])))
-        for event in host.receive_runs(stream, 0.0):
-            yield event.zones if isinstance(event, Arrival) else event
+        yield from host.receive(stream, 0.0)
         if rng.random() < 0.1:
             yield contactfpga.SkinMismatch("another bitstream")
 
@@ -176,13 +149,12 @@ def times(items):
 def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rng):
     """Whether it waits already or is yet to come."""
     queue, plain, came, seen = FrameQueue(maxsize, came=5), [], 5, 5
-    for item in runs_and_frames(rng, 300):
+    for item in runs_and_errors(rng, 300):
         if isinstance(item, Exception):
             continue
         queue.put(item)
-        frames = list(item) if isinstance(item, Run) else [item]
-        plain += [(came + index, zones) for index, zones in enumerate(frames, 1)]
-        came += len(frames)
+        plain += [(came + index, zones) for index, zones in enumerate(item, 1)]
+        came += len(item)
         plain = [one for one in plain if one[0] > seen][-maxsize:]
         seen = came - len(plain) if seen < came else seen
         match rng.randrange(5):
@@ -191,14 +163,11 @@ def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rn
                 assert queue.show(number) == (number > seen)
                 seen = max(seen, number)
                 plain = [one for one in plain if one[0] > seen]
-                if isinstance(item, Zones) and rng.random() < 0.5:
-                    queue.skip_to(item)
-                    seen, plain = max(seen, came), []
             case 1 if plain:
                 seen, zones = plain.pop(0)
                 assert queue.pop().time_us == zones.time_us
             case 2:
-                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                found = frames_in(queue.pop_frames())
                 assert times(found) == times([zones for _, zones in plain])
                 seen, plain = max(seen, came), []
         assert (len(queue), queue.seen) == (len(plain), seen)
@@ -208,28 +177,22 @@ def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rn
 @pytest.mark.parametrize("maxsize", [1, 7, 100, 10_000])
 def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
     queue, plain, dropped = FrameQueue(maxsize), [], 0
-    for item in runs_and_frames(rng, 300):
+    for item in runs_and_errors(rng, 300):
         queue.put(item)
         plain += item if isinstance(item, Run) else [item]
         gone, plain = plain[: max(0, len(plain) - maxsize)], plain[max(0, len(plain) - maxsize) :]
         dropped += sum(isinstance(one, Zones) for one in gone)
         assert (queue.dropped, len(queue)) == (dropped, len(plain))
-        match rng.randrange(8):
+        match rng.randrange(6):
             case 0 | 1:
                 for _ in range(min(rng.randrange(5), len(plain))):
                     assert times([queue.pop()]) == times([plain.pop(0)])
             case 2:
                 head = next((at for at, one in enumerate(plain) if isinstance(one, Exception)), len(plain))
-                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                found = frames_in(queue.pop_frames())
                 assert times(found) == times(plain[:head])
                 plain = plain[head:]
-            case 3 if isinstance(item, Zones):
-                queue.skip_to(item)
-                plain = []
-            case 4 if len(plain) < maxsize and isinstance(item, Zones):
-                queue.put_back(item)
-                plain.insert(0, item)
-            case 5 if not any(isinstance(one, Exception) for one in plain):
+            case 3 if not any(isinstance(one, Exception) for one in plain):
                 queue.keep_last()
                 plain = plain[-1:]
         assert (queue.first_error() is None) == (not plain or not isinstance(plain[0], Exception))
@@ -240,7 +203,7 @@ def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
 def test_one_frame_is_not_both_shown_and_taken(take):
     """The C reader's `latest()` shows a frame without the board's lock, as another thread takes the next one."""
     queue, drop, shown = FrameQueue(4), FrameQueue._drop_shown, []
-    queue.put(Zones.__new__(Zones))
+    queue.put(next(runs_and_errors(random.Random(1), 1)))
     thread = threading.Thread(target=lambda: shown.append(queue.show(1)))
 
     def drop_and_pause():

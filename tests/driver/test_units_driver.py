@@ -6,7 +6,7 @@ from model_board import SCAN_US, ModelBoard
 from wire import digits, seal
 
 from contactfpga import Skin, UnitSamples
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.wire.units import Sweep, UnitFacts
 from contactfpga.zones.units import UnitHistory, only
 
@@ -32,9 +32,8 @@ class Line:
         return self.give(seal(data, self.board.wire.known.fingerprint[:2]))
 
     def frame(self):
-        (event,) = self.give(self.board.frame())
-        assert isinstance(event, Arrival)
-        return event.zones
+        (zones,) = frames_in(self.give(self.board.frame()))
+        return zones
 
 
 def test_units_of_a_frame_are_known_once_a_sweep_before_and_one_after_have_come():
@@ -56,9 +55,9 @@ def test_a_run_of_frames_has_them_too():
     line = Line()
     line.sweep(150, 10, 10)
     packets = [line.board.frame() for _ in range(40)]
-    runs = line.host.receive_runs(b"".join(packets), 0.0)
+    events = line.host.receive(b"".join(packets), 0.0)
     line.sweep(9_000, 20, 20)
-    frames = [zones for run in runs for zones in (run if not isinstance(run, Arrival) else [run.zones])]
+    frames = frames_in(events)
     assert len(frames) == 40
     assert all(zones.units is not None for zones in frames)
 

@@ -134,8 +134,8 @@ FAULTS = {
     "a masked switch tells of motion": Fault("scan/reversal_rows.py", "touched.eq(self.read & whole)",
         "touched.eq(self.read)", f"{GATEWARE}/test_reversal_scanner.py"),
     "the time of a row goes on in the debounce": Fault("debounce/timed.py",
-        "            with m.If(enters):\n                m.d.sync += now.eq(self.now)\n",
-        "            m.d.comb += now.eq(self.now)\n",
+        "        with m.If(enters):\n            m.d.sync += now.eq(self.now)\n",
+        "        m.d.comb += now.eq(self.now)\n",
         f"{GATEWARE}/test_debounce.py::test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told"),
 }  # fmt: skip
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rivals
+from study_pages import cells, section
 from zone_oracles import cells_of, zones_by_scipy
 
 from contactfpga_hdl.board.sizes import DEVICES
@@ -147,7 +148,8 @@ def test_ours_are_right_on_the_frames_of_the_page(labeller):
 
 
 def test_ours_are_as_large_as_the_page_on_performance_says():
-    sizes = {(row["design"], row["device"]): row for row in table("performance-gateware")}
+    head, _, *rows = cells(section("performance.md", "gateware"))
+    sizes = {(design, device): dict(zip(head[2:], rest)) for design, device, *rest in rows}
     for row in table("rivals-rivals"):
         if row["labeller"] != rivals.NAME:
             for device in DEVICES:

@@ -171,3 +171,12 @@ def test_zones_around_a_cylinder_are_those_of_an_unrolled_sheet(connectivity, co
             records.append((len(x), int(x.sum()), int(y.sum()), past))
         of_many = departures.moments[departures.offsets[index] : departures.offsets[index + 1]].tolist()
         assert sorted(map(tuple, of_many)) == sorted(records)
+
+
+@pytest.mark.parametrize("labeller", [one for one in LABELLERS.values() if one.exact], ids=lambda one: one.name)
+@pytest.mark.parametrize("connectivity", [8, 4])
+def test_the_last_two_rows_alone_decide_how_late_the_last_record_is(labeller, connectivity):
+    rng = np.random.default_rng(3)
+    frames = rng.random((500, 9, 16)) < rng.choice([0.1, 0.3, 0.6, 0.9], (500, 1, 1))
+    whole = golden.last_record_clocks(frames, connectivity, labeller)
+    assert np.array_equal(golden.last_record_clocks(frames[:, -2:], connectivity, labeller), whole)

@@ -8,7 +8,7 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver.address import parse
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.driver.stats import NetCounters
 from contactfpga.robot.net.message import BEAT_S, QUIET_S, Message, Stream
 from contactfpga.robot.net.session import LOOPBACK, is_loopback, key_of, own_endpoint
@@ -44,7 +44,7 @@ class Receiver:
         for data, after_break in self.stream.take(payload, now_s):
             if after_break:
                 self.host.doubt(now_s)
-            self.frames += [event.zones for event in self.host.receive(data, now_s) if isinstance(event, Arrival)]
+            self.frames += frames_in(self.host.receive(data, now_s))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -3,7 +3,7 @@
 import pytest
 
 from contactfpga.tools.console.outputs import OutputError
-from contactfpga_sim.lab import beside, writer
+from contactfpga_sim.lab import writer
 
 PAGE = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
 
@@ -46,21 +46,33 @@ def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
     assert writer.page(tmp_path / "page.md").read_text() == PAGE
 
 
-LONG = '    a command\n\n| a | b |\n|---|---|\n| 1, 2 |  |\n| 3 | x y |\n| 4 | "z" |\n\n| c |\n|---|\n| 5 |\n\nafter'
+AFTER = "| c |\n|---|\n| 5 |\n\nafter"
+LONG = f'    a command\n\n| a | b, µs |\n|---|---|\n| 1, 2 |  |\n| 3 | x y |\n| 4 | "z" |\n\n{AFTER}'
 
 
 @pytest.mark.parametrize(
     ("columns", "shown", "rows"),
     [
-        (None, ["| a | b |", "|---|---|", "| 3 | x y |", '| 4 | "z" |'], "3 rows"),
-        ("b", ["| b |", "|---|", "| x y |", '| "z" |'], "3 rows, 2 columns"),
+        ((), ["| a | b, µs |", "|---|---|", "| 3 | x y |", '| 4 | "z" |'], "3 rows"),
+        (("b, us",), ["| b, µs |", "|---|", "| x y |", '| "z" |'], "3 rows, 2 columns"),
     ],
 )
 def test_what_a_page_leaves_out_of_a_table_is_in_a_file_beside_it(tmp_path, columns, shown, rows):
     file = tmp_path / "tables" / "page-one.csv"
-    text = beside.part(LONG, "x|z", file, *([columns] if columns else []))
+    table = writer.Table(
+        ("a", "b, us"), [("1, 2", ""), ("3", "x y"), ("4", '"z"')], lambda row: row[0] != "1, 2", columns,
+        "    a command", AFTER,
+    )  # fmt: skip
+    text = table.on_page(file)
     assert text.splitlines()[2:8] == [*shown, "", f"All [{rows}](tables/page-one.csv)."]
     assert text.partition("csv).\n")[2] == LONG.partition('"z" |\n')[2]
-    assert file.read_text() == 'a,b\n"1, 2",\n3,x y\n4,"""z"""\n'
+    assert file.read_text() == 'a,"b, µs"\n"1, 2",\n3,x y\n4,"""z"""\n'
     (tmp_path / "page.md").write_text(f"a\n<!-- figures: one -->\n{text}\n<!-- end -->\nb\n")
-    assert beside.whole(tmp_path / "page.md", "one") == LONG
+    assert writer.whole(tmp_path / "page.md", "one") == LONG == writer.spelled(str(table))
+
+
+def test_a_table_that_is_shown_whole_has_no_file(tmp_path):
+    for chosen in ({}, {"shown": lambda row: True, "columns": ("a", "b")}):
+        table = writer.Table(("a", "b"), [("1", "2")], **chosen)
+        assert table.on_page(tmp_path / "one.csv") == str(table) == "| a | b |\n|---|---|\n| 1 | 2 |"
+    assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ from child_processes import alive
 from fake_board import wait_until
 from verification import Outcome
 
-from contactfpga_sim.lab import beside
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.studies import STUDIES
 from contactfpga_sim.verify.mutants.campaign import Result
 from contactfpga_sim.verify.mutants.netlist import Mutant
@@ -35,8 +35,8 @@ def test_a_claim_is_judged_by_its_tests(results, said, wrong):
 def project(tmp_path, monkeypatch):
     """The pages and the files of their tables, to be changed."""
     docs = tmp_path / "docs"
-    (docs / beside.FOLDER).mkdir(parents=True)
-    for file in [*(audit.ROOT / "docs").glob("*.md"), *(audit.ROOT / "docs" / beside.FOLDER).iterdir()]:
+    (docs / writer.FOLDER).mkdir(parents=True)
+    for file in [*(audit.ROOT / "docs").glob("*.md"), *(audit.ROOT / "docs" / writer.FOLDER).iterdir()]:
         (docs / file.relative_to(audit.ROOT / "docs")).write_text(file.read_text())
     monkeypatch.setattr(audit, "ROOT", tmp_path)
     return docs
@@ -45,7 +45,7 @@ def project(tmp_path, monkeypatch):
 def test_a_table_that_is_not_what_it_would_be_today_is_seen(project):
     study = STUDIES["units"]
     assert not audit.table(study, "units", math.inf).wrong
-    file = project / beside.FOLDER / "units-units.csv"
+    file = project / writer.FOLDER / "units-units.csv"
     file.write_text(file.read_text().replace("3.3 V,1 MHz,60 µs", "3.3 V,1 MHz,61 µs"))
     found = audit.table(study, "units", math.inf)
     assert (found.said, found.wrong) == ("differs", True)

@@ -60,6 +60,8 @@ def test_a_claim_stands_or_falls_with_its_tests(tmp_path, cases, needs, said):
     lines, wrong = verification.judge({"section": [{"claim": [claim]}]}, verification.read_results([results]))
     assert [line.partition(" (")[0] for line in wrong] == ([said] if said else [])
     assert len(lines) == 1
+    drawn = verification.judge({"section": [{"claim": [claim]}]}, verification.read_results([results]), drawn=True)[1]
+    assert drawn == ([] if said and "MISSING" in said else wrong)
 
 
 def test_cases_are_counted(tmp_path):

@@ -220,7 +220,7 @@ def test_a_table_counts_the_fates_by_stage():
     ]
     fates = ["killed", "equivalent", "killed", "alive"]
     results = [campaign.Result("8x8", mutant, fate) for mutant, fate in zip(mutants, fates)]
-    lines = tables.table(results).splitlines()
+    lines = str(tables.table(results)).splitlines()
     assert "| scan | 2 | 1 | 1 | 0 | 100.0 % |" in lines
     assert "| link | 2 | 1 | 0 | 1 | 50.0 % |" in lines
     assert lines[-1] == "| all | 4 | 2 | 1 | 1 | 66.7 % |"

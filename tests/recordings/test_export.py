@@ -8,14 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from model_board import ModelBoard
-from recorded_stream import StreamPort, recorded
+from recorded_stream import StreamPort, recorded, written
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, recorder
 from contactfpga.tools.recordings.export import COLUMNS, pieces
-from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.protocol import Frame, no_records
 
 
@@ -85,15 +84,13 @@ def test_bytes_that_could_not_be_used_are_counted(tmp_path, capsys):
     board = ModelBoard(Skin())
     hello, frames = board.hello(), [board.frame() for _ in range(20)]
     broken = bytes([frames[5][0] ^ 1]) + frames[5][1:]
-    file = McapFile(tmp_path / "x.mcap")
-    for link, data in (
-        ("whole", hello + b"".join(frames)),
-        ("late", b"".join(frames[:3]) + hello + b"".join(frames[3:])),
-        ("damaged", hello + b"".join([*frames[:5], broken, *frames[6:]])),
-        ("deaf", b"".join(frames)),
-    ):
-        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
-    file.close()
+    sent = {
+        "whole": hello + b"".join(frames),
+        "late": b"".join(frames[:3]) + hello + b"".join(frames[3:]),
+        "damaged": hello + b"".join([*frames[:5], broken, *frames[6:]]),
+        "deaf": b"".join(frames),
+    }
+    written(tmp_path / "x.mcap", sent)
     words = ["export", str(tmp_path / "x.mcap"), str(tmp_path / "x.csv")]
     assert cli.main([*words, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)

@@ -5,15 +5,15 @@ import pytest
 from fake_board import FakeBoard, wait_until
 from mcap.reader import make_reader
 from model_board import ModelBoard
-from recorded_stream import NAMES, StreamPort, recorded, recorded_both, rewritten
+from recorded_stream import NAMES, StreamPort, recorded, recorded_both, rewritten, written
 from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.body import Body
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, Session, recorder
-from contactfpga.tools.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.recordings.recover import recover
 from contactfpga.wire.hello import Cutter
 
@@ -64,10 +64,8 @@ def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):
-    file = McapFile(tmp_path / "x.mcap")
-    for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
-        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
-    file.close()
+    arm = ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()
+    written(tmp_path / "x.mcap", {"arm": arm, "leg": b"\0\0noise\0"})
     recording = Recording(tmp_path / "x.mcap")
     assert list(recording.links) == ["arm"]
     assert [link for _, link, _ in recording.frames()] == ["arm"]
@@ -76,13 +74,8 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
 
 def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
     """And not in that in which their boards spoke."""
-    file = McapFile(tmp_path / "x.mcap")
-    for link in ("arm", "leg", "chest"):
-        file.metadata("contactfpga", {"link": link})
     data = ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()
-    for link in ("chest", "arm", "leg"):
-        file.write(f"/{link}/bytes", recorder.BYTES, link, 5, recorder.of_bytes(data, 5, link), 0.0)
-    file.close()
+    written(tmp_path / "x.mcap", dict.fromkeys(("chest", "arm", "leg"), data), ("arm", "leg", "chest"))
     assert list(Recording(tmp_path / "x.mcap").links) == ["arm", "leg", "chest"]
 
 
@@ -120,16 +113,16 @@ def test_links_whose_names_become_one_topic_are_apart(tmp_path, names, bytes_onl
 )
 def test_what_could_not_be_read_again_is_not_recorded(tmp_path, names, said):
     with Session(tmp_path / "x.mcap") as session:
-        for name in names:
+        for name in names[:-1]:
             session.add(StreamPort(frames=1), name=name)
         with pytest.raises(contactfpga.ContactFPGAError, match=said):
-            session.start()
+            session.add(StreamPort(frames=1), name=names[-1])
 
 
 @pytest.fixture
 def both(tmp_path, monkeypatch):
     """Two boards of one name that were recorded at the same time, each in a file."""
-    monkeypatch.setattr(recorder, "_epoch_ns", lambda board: 10**18)
+    monkeypatch.setattr(link_recorder, "offset_ns", lambda *clocks: 10**18)
     ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200)]
     for number, port in enumerate(ports):
         recorded(tmp_path, port, name=f"{number}.mcap", bytes_only=True)
@@ -159,7 +152,7 @@ def test_merged_boards_of_one_topic_are_refused(tmp_path, both, capsys, apart):
 def test_recordings_one_after_the_other_may_be_merged(tmp_path, monkeypatch, apart):
     files, sent = [tmp_path / f"{number}.mcap" for number in range(3)], b""
     for number, file in enumerate(files):
-        monkeypatch.setattr(recorder, "_epoch_ns", lambda board, number=number: 10**18 + number * 10**10)
+        monkeypatch.setattr(link_recorder, "offset_ns", lambda *clocks, number=number: 10**18 + number * 10**10)
         port = StreamPort(frames=100 * (number + 1))
         recorded(tmp_path, port, name=file.name, bytes_only=True)
         sent += port.sent

@@ -1,16 +1,15 @@
 """What `contactfpga record` writes, replay and Recording read."""
 
-from types import SimpleNamespace
-
 import pytest
 from fake_board import wait_until
 from recorded_stream import StreamPort, recorded, replayed
+from wire import old_frame, old_hello
 
 import contactfpga
 from contactfpga import Skin
+from contactfpga.recordings import Recording, Session
+from contactfpga.robot.ros.feed import offset_ns
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, recorder
-from contactfpga.tools.recordings.session import Session
 
 SKIN = Skin()
 LONG = 60.0
@@ -53,15 +52,14 @@ def test_frames_come_with_their_times(tmp_path):
     assert [t - times[50] for t in times[50:]] == pytest.approx([t - device[50] for t in device[50:]], abs=0.002)
 
 
-def test_its_times_do_not_move_where_the_program_rests_between_two_clocks(monkeypatch):
+def test_its_times_do_not_move_where_the_program_rests_between_two_clocks():
     now_s, rests_s = [7.0], iter([0.0, 3.0, 0.5])
 
     def look():
         now_s[0] += next(rests_s, 0.0)
         return now_s[0]
 
-    monkeypatch.setattr(recorder.time, "time_ns", lambda: 10**18 + round(look() * 1e9))
-    assert recorder._epoch_ns(SimpleNamespace(clock=look)) == 10**18
+    assert offset_ns(lambda: 10**18 + round(look() * 1e9), look) == 10**18
 
 
 @pytest.mark.parametrize(("start_s", "end_s"), [(0.0, 0.1), (0.234, 0.5), (0.59, None), (1.0, None)])
@@ -72,6 +70,30 @@ def test_a_part_of_a_recording_is_the_same_as_in_the_whole(tmp_path, start_s, en
     expected = [(t, zones.to_dict()) for t, _, zones in recording.frames() if start_s <= t < end]
     assert [(t, zones.to_dict()) for t, _, zones in recording.frames(start_s, end_s)] == expected
     assert len(expected) == pytest.approx(min(end, 0.6) * 1000 - min(start_s, 0.6) * 1000, abs=15)
+
+
+def test_a_file_of_bytes_alone_has_the_times_of_its_board(tmp_path):
+    port, file = StreamPort(SKIN.replace(name="palm")), tmp_path / "x.rec"
+    recorded(tmp_path, port)
+    file.write_bytes(port.sent)
+    with contactfpga.open(f"replay://{file}") as board:
+        frames = list(board)
+    recording = Recording(file)
+    times = [(zones.time_us - frames[0].time_us) / 1e6 for zones in frames]
+    assert (list(recording.links), recording.skins, recording.start_s) == (["palm"], {"palm": None}, None)
+    assert recording.duration_s == pytest.approx(times[-1])
+    assert b"".join(data for _, data in recording.raw_bytes()) == port.sent
+    for start_s, end_s in ((0.0, None), (0.2, None), (0.2503, 0.3), (times[-1], None)):
+        wanted = [(t_s, zones.to_dict()) for t_s, zones in zip(times, frames) if start_s <= t_s < (end_s or 1e9)]
+        assert [(t_s, zones.to_dict()) for t_s, _, zones in recording.frames(start_s, end_s)] == wanted
+    assert cli.main(["export", str(file), str(tmp_path / "x.csv")]) == 0
+    assert (tmp_path / "x.csv").read_text().count("palm") >= len(frames)
+
+
+def test_a_file_of_an_older_protocol_is_told(tmp_path):
+    (tmp_path / "x.rec").write_bytes(old_hello() + old_frame())
+    with pytest.raises(contactfpga.VersionMismatch, match=r"x\.rec speaks protocol version 1, this host version 2"):
+        Recording(tmp_path / "x.rec").frames()
 
 
 def test_replay_starts_at_the_hello_before_a_time(tmp_path):

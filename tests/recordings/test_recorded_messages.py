@@ -3,8 +3,7 @@
 import pytest
 import ros_messages
 
-from contactfpga.driver import mcap
-from contactfpga.tools.recordings import link_recorder, recorder
+from contactfpga.tools.recordings import mcap, messages
 from contactfpga.zones.units import UnitSamples
 
 NS = 1_700_000_000_123_456_789
@@ -24,15 +23,15 @@ def head(link):
 @pytest.mark.parametrize("link", ["", "a", "left_hand", "\u00e4 link", "four"])
 @pytest.mark.parametrize("data", [b"", b"\0", b"\0abc\0" * 77])
 def test_bytes(link, data):
-    message = recorder.of_bytes(data, NS, link)
-    assert read_back(message, recorder.BYTES) == {"header": head(link), "data": data}
+    message = messages.of_bytes(data, NS, link)
+    assert read_back(message, messages.BYTES) == {"header": head(link), "data": data}
     assert mcap.data_of(message) == data
 
 
 def test_faults_and_units():
-    read = read_back(link_recorder.of_faults(("row 1 open", "x"), NS, "link"), link_recorder.FAULTS)
+    read = read_back(messages.of_faults(("row 1 open", "x"), NS, "link"), messages.FAULTS)
     assert read == {"header": head("link"), "names": ["row 1 open", "x"]}
     samples = UnitSamples(77, (1.0, 4095.0), (0.25, 0.5), (False, True))
-    read = read_back(link_recorder.of_units(samples, NS, "link"), link_recorder.UNITS)
+    read = read_back(messages.of_units(samples, NS, "link"), messages.UNITS)
     assert (read["device_time_us"], read["readings"], read["saturated"]) == (77, [1.0, 4095.0], [False, True])
     assert read["sigma"] == [0.25, 0.5]

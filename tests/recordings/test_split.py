@@ -3,8 +3,8 @@
 import pytest
 from recorded_stream import NAMES, StreamPort, recorded, recorded_both, replayed
 
+from contactfpga.recordings import Recording
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.recorder import Split
 
 SPLIT = {"split": Split(bytes=3_000), "bytes_only": True}

@@ -13,9 +13,9 @@ from recorded_stream import replayed
 
 import contactfpga
 from contactfpga.driver.conversation import Conversation
+from contactfpga.recordings import Session
 from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.recordings.link_recorder import LinkMessages
-from contactfpga.tools.recordings.session import Session
 
 
 @pytest.mark.parametrize("end_s", [0.05, 60.0])
@@ -81,9 +81,9 @@ def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed)
 
         monkeypatch.setattr(where, name, pausing)
 
-    paused(link_recorder.Buffer, "take")
-    paused(link_recorder.Buffer, "end_at")
-    paused(Conversation, "receive_runs")
+    paused(link_recorder.LinkRecorder, "take")
+    paused(link_recorder.LinkRecorder, "end_at")
+    paused(Conversation, "receive")
     file = tmp_path / "touches.mcap"
     with Streaming(contactfpga.Skin()) as board, Session(file) as session:
         session.add(board.path, timeout=60.0)

@@ -171,8 +171,8 @@ def test_every_command_refuses_and_says_what_to_do(mark, skin, tmp_path, capsys,
 def test_the_texts_of_a_recording_import_nothing(mark, tmp_path, monkeypatch, capsys):
     pytest.importorskip("amaranth")
     pytest.importorskip("mcap")
+    from contactfpga.recordings import Recording
     from contactfpga.robot.body import packed
-    from contactfpga.tools.recordings import Recording
 
     evil = f'"l\\u0061beller" = "{NAMED}"\n'
     (tmp_path / "skin.toml").write_text(Skin().to_toml())

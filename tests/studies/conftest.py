@@ -5,9 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from fits import Shortcuts
 
-from contactfpga_sim.lab import kept, pool
-from contactfpga_sim.lab.chart import speed
-from contactfpga_sim.lab.fit import cost
+from contactfpga_sim.apps import kept, pool, speed
+from contactfpga_sim.apps.fit import cost
 
 
 @pytest.fixture

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.sweep import SweepTask
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -34,31 +33,14 @@ def test_safe_speed_lies_where_the_worst_force_so_far_crosses_the_limit():
     assert math.isnan(sweep.safe_speed(speeds, forces, 20.0))
 
 
-def test_the_naive_speed_is_the_papers_bound_and_no_safe_one():
-    """paper-check: 0.240 m/s for 15 N, 4.156 N and 6 ms; the peak is above 15 N already at 0.23 m/s."""
-    assert sweep.closing_n(PAPER) == pytest.approx(4.15555, abs=5e-6)
-    assert sweep.naive_speed(PAPER, 15.0, 6e-3) == pytest.approx(0.240, abs=5e-4)
-    assert run(PAPER, "latency", latency_s=6e-3).outcome.peak_force_n > 15
-
-
-@pytest.mark.slow
-def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
-    case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})
-    point = sweep.SweepPoint(**sweep.work(SweepTask(case, latency_s=6e-3, thickness=True)))
-    for less, flat in ((0.0, False), (2 * sweep.RESOLUTION_M, True)):
-        thick = case.but(foam={"thickness_m": point.thickness_m - less}, run={"step_s": 25e-6, "duration_s": 0.05})
-        assert run(thick, "latency", latency_s=6e-3).outcome.bottomed == flat
-    assert 4e-3 < point.thickness_m < 5e-3
-
-
 @pytest.mark.slow
 def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeypatch, capsys):
     few = pictures.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
-    few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
+    few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force})
     monkeypatch.setattr(pictures, "plan", lambda case: few)
     assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
     said = capsys.readouterr().out
-    ends = [f"{name}.{end}" for name in ("arm-force", "arm-thickness") for end in ("png", "svg")]
+    ends = ["arm-force.png", "arm-force.svg"]
     assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
 
@@ -71,7 +53,7 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
 @pytest.mark.slow
 def test_charts_of_a_few_points(nothing_kept, tmp_path):
     tasks = pictures.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
-    few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})
+    few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]})
     steps = []
     with ThreadPoolExecutor(1) as workers:
         points = sweep.sweep(few.all, workers, lambda name, of: steps.append(of))
@@ -86,7 +68,7 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
     assert slow.peak_force_n < fast.peak_force_n == pytest.approx(at.peak_force_n)
     drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
     paths = pictures.draw(PAPER, drawn, found, tmp_path, ("svg",))
-    assert [path.name for path in paths] == ["arm-force.svg", "arm-thickness.svg"]
+    assert [path.name for path in paths] == ["arm-force.svg"]
     assert "paper: 12 N when it reacts, after 6 ms" in paths[0].read_text()
     text = pictures.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
     lines = list(csv.DictReader(text.splitlines()))

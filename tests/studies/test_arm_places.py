@@ -13,7 +13,7 @@ from scipy.stats import binom
 from contactfpga.design.cover import Ball, cells_of
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm import anywhere, places
 from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
 from contactfpga_sim.lab.arm.case import Case

@@ -145,4 +145,4 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert section("arm.md", "set") == writer.spelled(tables.set_table(tables.ArmRuns(None, {}, found, {})))
+    assert section("arm.md", "set") == writer.spelled(str(tables.set_table(tables.ArmRuns(None, {}, found, {}))))

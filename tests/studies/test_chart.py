@@ -17,24 +17,11 @@ from study_pages import outdated
 from contactfpga.design.cover import Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import (
-    beside,
-    compute,
-    errors,
-    front_picture,
-    host,
-    numbers,
-    picture,
-    speed,
-    tables,
-    times,
-    times_picture,
-)
+from contactfpga_sim.apps import errors, kept, speed, stats
+from contactfpga_sim.apps.errors import Blob
+from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.errors import Blob
-from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.chart.rivals import RIVALS
+from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -77,7 +64,7 @@ def test_found_and_there_are_paired_at_the_least_total_distance():
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 1000), (1, 1000), (500, 1000), (7, 7)])
 def test_shares_have_wilsons_interval(hits, count):
-    got = errors.interval([1.0] * hits + [0.0] * (count - hits))
+    got = stats.interval([1.0] * hits + [0.0] * (count - hits))
     want = binomtest(hits, count).proportion_ci(method="wilson")
     assert (got.mean, got.low, got.high) == pytest.approx((hits / count, want.low, want.high), abs=1e-12)
 
@@ -86,7 +73,7 @@ def test_the_interval_of_a_mean_holds_it_95_times_of_100():
     rng = np.random.default_rng(5)
     inside = 0
     for _ in range(1000):
-        got = errors.interval(rng.exponential(2.0, 400).tolist())
+        got = stats.interval(rng.exponential(2.0, 400).tolist())
         inside += got.low <= 2.0 <= got.high
     assert 925 <= inside <= 970
 
@@ -248,23 +235,23 @@ def test_the_interval_of_a_quantile_holds_it_95_times_of_100(share):
     rng = np.random.default_rng(6)
     want, inside = -math.log(1 - share), 0
     for _ in range(1000):
-        got = errors.quantile(rng.exponential(1.0, 200).tolist(), share)
+        got = stats.quantile(rng.exponential(1.0, 200).tolist(), share)
         inside += got.low <= want <= got.high
     assert 930 <= inside <= 985
 
 
 def test_a_quantile_of_few_values_or_of_some_that_never_come_has_no_upper_end():
-    assert errors.quantile([3.0, 1.0, 2.0], 0.5) == errors.Quantile(2.0, 0.0, math.inf, 3)
+    assert stats.quantile([3.0, 1.0, 2.0], 0.5) == stats.Quantile(2.0, 0.0, math.inf, 3)
     felt = [float(value) for value in range(180)]
-    assert math.isinf(errors.quantile([*felt, *[math.inf] * 20], 0.95).value)
-    assert errors.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
+    assert math.isinf(stats.quantile([*felt, *[math.inf] * 20], 0.95).value)
+    assert stats.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
 
 
 def test_what_to_build_miscounts_least_over_all_families_and_has_a_cover():
     points = numbers.read(ROOT / tables.NUMBERS)
     shares = {
         method: np.mean([one.errors["total"]["miscounted"].mean for one in points if one.task.method == method])
-        for method in METHODS
+        for method in SHEETS
     }
     build = compute.to_build(points)
     assert METHODS[build].cover is not None
@@ -329,15 +316,6 @@ def test_the_page_shows_what_its_numbers_say(tmp_path):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
 
 
-def test_ways_beside_the_chart_are_found_on_its_families():
-    found = beside.rivals(("bumper",), 3, 0)
-    assert [(one.name, one.family) for one in found] == [(name, "bumper") for name in RIVALS]
-    assert all(one.touch_us.value > 0 and one.errors["miscounted"].count == 3 for one in found)
-    task = next(point.task for point in numbers.read(ROOT / tables.NUMBERS) if point.task.family == "bumper")
-    assert 0 < beside.least_mm(task).mean < task.skin.pitch_x_mm
-    assert beside.least_mm(dataclasses.replace(task, family="fingers")) is None
-
-
 def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
     points = numbers.read(ROOT / tables.NUMBERS)
     axes, _ = front_picture.picture(points).axes
@@ -369,16 +347,16 @@ def test_what_is_never_felt_is_drawn_as_never():
 
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
-def test_the_pages_numbers_are_found_again(tmp_path):
-    assert cli.main(["study", "chart", "--output", str(tmp_path)]) == 0
-    for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / tables.NUMBERS), strict=True):
+def test_the_pages_numbers_are_found_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "NUMBERS", tmp_path / "chart.csv")
+    for found, shown in zip(tables.compute(), numbers.read(ROOT / "docs/chart/chart.csv"), strict=True):
         assert dataclasses.replace(found, host_us=shown.host_us) == shown
 
 
 @pytest.mark.slow
 def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
-    monkeypatch.setattr(tables, "SHEETS", (16,))
+    monkeypatch.setattr(tables, "SIDES", (16,))
     monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
-    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in tables.host_table().splitlines()[2:]}
+    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in str(tables.host_table()).splitlines()[2:]}
     # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
     assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}

@@ -19,7 +19,7 @@ from contactfpga.design.sheet.caps import PLATE_MM, caps
 from contactfpga.design.sheet.drawn import BOARDS
 from contactfpga.design.sheet.parts import DOME
 from contactfpga.tools import cli
-from contactfpga_sim.lab.finger.stages import ASSUMED_HOST_US
+from contactfpga_sim.apps.latency.stages import ASSUMED_HOST_US
 from contactfpga_sim.verify import wave
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

@@ -15,10 +15,12 @@ from scipy.stats import fisher_exact
 from study_pages import outdated, section
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.failures import electric, knob_pictures, line, rated, tables, touch
+from contactfpga_sim.apps import stats
+from contactfpga_sim.lab import knobs, writer
+from contactfpga_sim.lab.failures import electric, line, tables, touch
 from contactfpga_sim.lab.failures.catalogue import KNOBS
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
 from contactfpga_sim.lab.failures.line import Line
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
@@ -96,9 +98,11 @@ def turned(turn):
 def test_it_breaks_where_the_page_says(turn, name, method):
     place = list(KNOBS[name].runs).index(method)
     lines = section("failures.md", "failures").splitlines()
-    first = next(number for number, line in enumerate(lines) if f"](#{name}): " in line)
+    first = next(
+        number for number, line in enumerate(lines) if line.startswith(writer.spelled(f"| {KNOBS[name].title}: "))
+    )
     found = tables.rows(KNOBS[name], {method: turn(name, method)})[0]
-    assert lines[first + place].split(" | ")[1:-1] == found.split(" | ")[1:-1]
+    assert lines[first + place].split(" | ")[1:-1] == list(found[1:-1])
 
 
 @pytest.mark.slow
@@ -132,22 +136,22 @@ def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turn, name, method):
 
 def test_what_passes_unnoticed_has_its_reason_on_the_page():
     reasons = section("failures.md", "unnoticed")
-    name, silent = "", set()
-    for row in section("failures.md", "failures").splitlines():
-        name = found[1] if (found := re.search(r"\]\(#(\w+)\)", row)) else name
+    names = {writer.spelled(f"{knob.title}: {knob.axis}"): name for name, knob in KNOBS.items()}
+    silent, name = set(), ""
+    for row in section("failures.md", "failures").splitlines()[2:]:
+        name = names.get(row[2:].partition(" | ")[0], name)
         silent |= {name} if "**not noticed**" in row else set()
-    assert set(re.findall(r"\]\(#(\w+)\)", reasons)) == silent
+    assert {row[2:].partition(" | ")[0] for row in reasons.splitlines()[2:]} == {
+        writer.spelled(KNOBS[one].title) for one in silent
+    }
     for name in silent:
         assert KNOBS[name].unnoticed
         assert f"| {KNOBS[name].unnoticed} |" in reasons
 
 
 @pytest.mark.campaign
-def test_the_page_and_its_pictures_are_up_to_date(turned):
+def test_the_page_is_up_to_date(turned):
     assert not outdated("failures", turned)
-    for name in KNOBS.keys() - tables.SAID.keys():
-        drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
-        assert knob_pictures.svg(KNOBS[name], turned[name]) == drawn
 
 
 # ---- the same by other ways
@@ -218,10 +222,10 @@ def test_fingers_on_the_kit_are_told_apart_as_image_tools_count_them(turn, force
 def shown_rate(text):
     """Right draws and all of them, from the share and the interval that are shown."""
     share = float(re.match(r"[\d.]+", text)[0])
-    for of in rated.LOOKS:
+    for of in knobs.LOOKS:
         near = round(share * of / 100)  # the share is rounded
         for right in range(max(0, near - 1), min(of, near + 1) + 1):
-            if str(rated.Rate(right, of)) == text:
+            if knobs.words(stats.Rate(right, of)) == text:
                 return right, of
     raise AssertionError(text)
 
@@ -361,7 +365,7 @@ def test_a_rate_is_judged_wrong_at_most_once_in_twenty(share, wrong):
     def draws(value, rng, count):
         return [Outcome(bool(right)) for right in rng.random(count) < share]
 
-    verdicts = [rated.Rated(draws, seed)(0.0).right for seed in range(300)]
+    verdicts = [knobs.Rated(draws, seed)(0.0).right for seed in range(300)]
     assert verdicts.count(not wrong) <= 15 + 3 * 15**0.5
 
 
@@ -370,7 +374,7 @@ def test_of_many_draws_the_wrong_one_that_is_not_told_is_shown():
     right = Outcome(True, ("motion",), "right")
 
     def of(*each):
-        return rated.Rated(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
+        return knobs.Rated(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
 
     assert (of().right, of().told, of().what, of().rate) == (True, ("motion",), "right", "100 % (95.0 to 100.0)")
     assert of(*[told] * 20).told == ("row N open",)
@@ -403,6 +407,6 @@ NEVER = "fails at the first value"
     ],
 )
 def test_lines_of_the_table(verdicts, expected):
-    knob = Knob("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
+    knob = Knob("x", "X", "x", tuple(range(len(verdicts))), {}, "it helps")
     (line,) = tables.rows(knob, {"method": outcomes(*verdicts)})
-    assert line.split(" | ")[1:-1] == ["method", *expected]
+    assert line[1:-1] == ("method", *expected)

@@ -10,8 +10,8 @@ from fits import APART, BUMPER, HANDS, SECOND, chosen, made_up
 from scipy.stats import binomtest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.fit.candidates import candidates, pitches_for
-from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.apps.fit.candidates import candidates, pitches_for
+from contactfpga_sim.apps.fit.sources import source
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -12,8 +12,8 @@ from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import size
-from contactfpga_sim.lab.fit import search
+from contactfpga_sim.apps import size
+from contactfpga_sim.apps.fit import search
 from contactfpga_sim.lab.studies import STUDIES
 
 pytestmark = pytest.mark.usefixtures("alone")

@@ -11,11 +11,12 @@ from scipy.stats import binom
 from contactfpga.design.cover import Cells, Ellipse, Load, load_cover
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab.covers import tiled
-from contactfpga_sim.lab.fit import faces, racing, search
-from contactfpga_sim.lab.fit.candidates import candidates
-from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Goals
+from contactfpga_sim.apps import stats
+from contactfpga_sim.apps.covers import tiled
+from contactfpga_sim.apps.fit import faces, measuring, search
+from contactfpga_sim.apps.fit.candidates import candidates
+from contactfpga_sim.apps.fit.sources import source
+from contactfpga_sim.apps.fit.trial import Goals
 
 pytestmark = pytest.mark.usefixtures("alone")
 
@@ -89,7 +90,7 @@ def test_a_share_lies_beyond_its_bound_no_more_often_than_said():
     for count, chance, err in ((20, 0.05, 0.01), (160, 0.05, 0.005), (500, 0.01, 0.005)):
         beyond = [0.0, 0.0]
         for wrong in range(count + 1):
-            low, high = (racing.chernoff(wrong / count, count, err, end) for end in (0.0, 1.0))
+            low, high = (stats.chernoff(wrong / count, count, err, end) for end in (0.0, 1.0))
             beyond[0] += (low > chance) * binom.pmf(wrong, count, chance)
             beyond[1] += (high < chance) * binom.pmf(wrong, count, chance)
         assert max(beyond) <= err
@@ -98,11 +99,11 @@ def test_a_share_lies_beyond_its_bound_no_more_often_than_said():
 
 def test_a_race_ends_as_soon_as_a_limit_is_surely_met_or_missed():
     goals = Goals(miscounted=0.05, missed=None, barycenter_mm=None)
-    assert racing.ends(500) == [20, 40, 80, 160, 320, 500]
-    assert racing.decided(goals, {"miscounted": [1.0] * 10 + [0.0] * 10}, 6) is False
-    assert racing.decided(goals, {"miscounted": [0.0] * 20}, 6) is None
-    assert racing.decided(goals, {"miscounted": [0.0] * 160}, 6) is True
-    assert racing.decided(goals, {"miscounted": [0.0] * 160, "unfelt": [1.0, *[0.0] * 159]}, 6) is None
+    assert stats.looks(20, 500) == [20, 40, 80, 160, 320, 500]
+    assert measuring.decided(goals, {"miscounted": [1.0] * 10 + [0.0] * 10}, 6) is False
+    assert measuring.decided(goals, {"miscounted": [0.0] * 20}, 6) is None
+    assert measuring.decided(goals, {"miscounted": [0.0] * 160}, 6) is True
+    assert measuring.decided(goals, {"miscounted": [0.0] * 160, "unfelt": [1.0, *[0.0] * 159]}, 6) is None
 
 
 def test_a_fingertip_is_felt_where_the_least_closing_force_is_reached():

@@ -7,13 +7,13 @@ from fits import BUMPER, HANDS, chosen
 from scipy.stats import binomtest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart import speed
-from contactfpga_sim.lab.chart.errors import Interval
-from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.fit import search
-from contactfpga_sim.lab.fit.candidates import METHODS, candidates, pitches_for, size_for
-from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import Goals, Measurement
+from contactfpga_sim.apps import speed
+from contactfpga_sim.apps.fit import search
+from contactfpga_sim.apps.fit.candidates import METHODS, candidates, pitches_for, size_for
+from contactfpga_sim.apps.fit.sources import source
+from contactfpga_sim.apps.fit.trial import Goals, Measurement
+from contactfpga_sim.apps.speed import Speed
+from contactfpga_sim.apps.stats import Interval
 
 pytestmark = pytest.mark.usefixtures("alone")
 

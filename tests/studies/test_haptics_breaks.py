@@ -9,10 +9,10 @@ from sample import sample
 from study_pages import section
 
 from contactfpga.robot.haptics import Contact, Plane, Touch
-from contactfpga_sim.lab.failures.knob import Sweep
 from contactfpga_sim.lab.failures.tables import rows
-from contactfpga_sim.lab.haptics import breaks, felt, pairs, tables
+from contactfpga_sim.lab.haptics import breaks, felt, tables
 from contactfpga_sim.lab.haptics.breaks import KNOBS
+from contactfpga_sim.lab.knobs import Sweep
 
 ALL = [(name, method) for name, knob in KNOBS.items() for method in knob.runs]
 QUICK = [
@@ -26,8 +26,8 @@ QUICK = [
 def on_page(name):
     """The lines of a knob in the page's table."""
     table = section("haptics_limits.md", "breaks").splitlines()[2:]
-    starts = [at for at, line in enumerate(table) if line.startswith("| [")] + [len(table)]
-    first = next(at for at in starts if f"(#{name})" in table[at])
+    starts = [at for at, line in enumerate(table) if not line.startswith("|  |")] + [len(table)]
+    first = next(at for at in starts if table[at].startswith(f"| {KNOBS[name].title}: "))
     return table[first : starts[starts.index(first) + 1]]
 
 
@@ -43,7 +43,7 @@ def swept(name, method, seed):
 @pytest.mark.parametrize(("name", "method"), sample(ALL, QUICK))
 def test_each_break_is_where_the_page_says(name, method):
     knob = KNOBS[name]
-    line = rows(knob, {method: swept(name, method, 0)})[0].split(" | ")[2:7]
+    line = list(rows(knob, {method: swept(name, method, 0)})[0][2:7])
     (stated,) = [one.split(" | ")[2:7] for one in on_page(name) if one.split(" | ")[1] == method]
     assert line == stated
 
@@ -103,14 +103,6 @@ def test_centers_of_pressure_of_many_placements_end_to_end():
     predicted = Plane().center(setting.cells.wrench(setting.cells.zeros + np.linalg.pinv(setting.cells.matrix) @ push))
     expected = np.sqrt(2 / 3 * np.trace(predicted.covariance_m2))
     assert tables.interval(errors)[0] == pytest.approx(expected, rel=0.1)
-
-
-def test_places_limit_the_forces_of_two_fingers():
-    """Not how they are computed: the page says so."""
-    off = {method: np.sqrt(np.mean(errors**2)) for method, errors in pairs.errors(60.0, 50).items()}
-    coarse, mean, known = (off[method] for method in pairs.METHODS)
-    assert mean == pytest.approx(coarse, rel=0.15)
-    assert known < 0.8 * coarse
 
 
 @pytest.mark.campaign  # which has a board of its own to compile

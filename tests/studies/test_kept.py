@@ -2,7 +2,7 @@
 
 import pytest
 
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 
 
 @pytest.fixture(autouse=True)

@@ -1,6 +1,8 @@
 """The studies: each section of a page has one owner and shows what its study makes; a toy study is made, listed and
 found out of date."""
 
+import csv
+import dataclasses
 import functools
 import inspect
 import re
@@ -13,8 +15,8 @@ from study_pages import DOCS, section
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import beside, meaning, studies, writer
-from contactfpga_sim.lab.registry import NO_ROW, Section, Study, StudyRun
+from contactfpga_sim.lab import meaning, studies, writer
+from contactfpga_sim.lab.registry import Section, Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
 ROOT = DOCS.parent
@@ -32,17 +34,17 @@ PLACES = [
 SECTIONS = [(study.name, name, section) for study in DECLARED for name, section in study.sections.items()]
 QUICK = {"cover", "failures", "haptics", "kits", "maker", "safety", "settle", "skin", "units"}
 """Studies whose samples `make test` makes; the other samples are for `make test-all`."""
-WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "mujoco observer", "performance",
+WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "performance",
          "safety", "tracking scores"}  # fmt: skip
 """Studies, and sections, that `make campaign` makes whole; of a section that is named no sample is made."""
 SHOWN = [
     *(
-        pytest.param(study, name, section.sample, marks=() if study in QUICK else pytest.mark.slow)
+        pytest.param(study, name, "sampled", marks=() if study in QUICK else pytest.mark.slow)
         for study, name, section in SECTIONS
         if section.sample and f"{study} {name}" not in WHOLE
     ),
     *(
-        pytest.param(study, name, section.makes, marks=(pytest.mark.campaign, pytest.mark.timeout(7200)))
+        pytest.param(study, name, "text", marks=(pytest.mark.campaign, pytest.mark.timeout(7200)))
         for study, name, section in SECTIONS
         if {study, f"{study} {name}"} & WHOLE
     ),
@@ -92,14 +94,14 @@ def run_of(study):
     return StudyRun(STUDIES[study])
 
 
-@pytest.mark.parametrize(("study", "name", "place"), SHOWN)
-def test_a_page_shows_what_its_study_makes(study, name, place):
+@pytest.mark.parametrize(("study", "name", "how"), SHOWN)
+def test_a_page_shows_what_its_study_makes(study, name, how):
     """A sample of the section, or all of it."""
     declared = STUDIES[study]
     absent = runner.lacking((*declared.needs, *declared.sections[name].needs))
     if absent:
         pytest.skip(f"needs {', '.join(absent)}")
-    made = run_of(study).call(place)
+    made = getattr(run_of(study), how)(name)
     assert f"\n{made}\n" in f"\n{section(declared.page_of(name), name)}\n"
 
 
@@ -110,19 +112,14 @@ def test_a_page_shows_the_pictures_that_its_study_draws(study, tmp_path):
         assert picture.read_bytes() == (DOCS / "images" / picture.name).read_bytes(), picture.name
 
 
-MOST_ROWS = 20
-"""Of a table that a command writes into a page: one for each number of the paper."""
-READ_WHOLE = {"skin.md: fields"}
+MOST_ROWS = 8
+READ_WHOLE = {"fields"}
 """A reader looks up any row of these."""
 
 
-def test_long_tables_are_in_files_beside_the_pages():
-    rows = {
-        f"{study.page_of(name)}: {name}": longest(writer.sections((DOCS / study.page_of(name)).read_text())[name].text)
-        for study in DECLARED
-        for name in study.sections
-    }
-    assert {name for name, count in rows.items() if count > MOST_ROWS} == READ_WHOLE
+def shown(study, name):
+    """The section's text as the page has it."""
+    return writer.sections((DOCS / study.page_of(name)).read_text(encoding="utf-8"))[name].text
 
 
 def longest(text):
@@ -130,32 +127,45 @@ def longest(text):
     return max((table.count("\n") - 2 for table in re.findall(r"(?:^\|.*\|\n)+", f"{text}\n", re.MULTILINE)), default=0)
 
 
+def file_of(study, name):
+    return f"{Path(study.page_of(name)).stem}-{name}.csv"
+
+
 @pytest.mark.parametrize(
     ("study", "name"),
-    [(study, name) for study in DECLARED for name, section in study.sections.items() if section.kept or section.heads],
+    [(study, name) for study in DECLARED for name in study.sections],
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
-def test_a_page_keeps_what_its_study_declares(study, name, tmp_path):
-    page = study.page_of(name)
-    file = tmp_path / f"{Path(page).stem}-{name}.csv"
-    declared = study.sections[name]
-    text = beside.part(section(page, name), declared.kept, file, declared.heads)
-    assert text == writer.sections((DOCS / page).read_text())[name].text
-    assert file.read_text() == (DOCS / beside.FOLDER / file.name).read_text()
-    assert (longest(text) < longest(section(page, name))) == bool(declared.kept)
-    assert (" columns](" in text) == bool(declared.heads)
-    assert bool(longest(text)) == (declared.kept != NO_ROW)
+def test_a_section_shows_a_picture_or_at_most_eight_rows(study, name):
+    """Of a table in a file at least three rows, which are there, too."""
+    text = shown(study, name)
+    assert longest(text) <= MOST_ROWS or name in READ_WHOLE
+    if f"({writer.FOLDER}/{file_of(study, name)})" in text:
+        with open(DOCS / writer.FOLDER / file_of(study, name), newline="", encoding="utf-8") as file:
+            head, *rows = list(csv.reader(file))
+        lines = text.partition("\n\nAll [")[0].splitlines()
+        cells, *page = [line[2:-2].split(" | ") for line in lines if line.startswith("| ")]
+        columns = [at for at, title in enumerate(head) if title in cells]
+        assert len(columns) == len(cells)
+        assert len(page) >= 3
+        assert (len(page), len(cells)) != (len(rows), len(head))
+        picked = iter([[row[at] for at in columns] for row in rows])
+        assert all(row in picked for row in page)
 
 
-MEASURED_ONCE = {f"rivals-{name}.csv" for name in ("rivals", "rivals_exact", "rivals_made_of")}
+MEASURED_ONCE = {"rivals-rivals.csv", "rivals-rivals_exact.csv", "rivals-rivals_made_of.csv", "chart-other_ways.csv"}
 WRITTEN_ELSEWHERE = MEASURED_ONCE | {"formal-claims.csv", "mutants-alive.csv", "verification.csv"}
 """By hand, by `make verification`, and from what scripts/rivals.py prints."""
 
 
 def test_each_file_beside_the_pages_belongs_to_a_section():
-    kept = {f"{Path(study.page_of(name)).stem}-{name}.csv" for study in DECLARED for name in study.sections
-            if study.sections[name].kept or study.sections[name].heads}  # fmt: skip
-    assert {path.name for path in (DOCS / beside.FOLDER).iterdir()} == kept | WRITTEN_ELSEWHERE
+    linked = {
+        file_of(study, name)
+        for study in DECLARED
+        for name in study.sections
+        if f"({writer.FOLDER}/{file_of(study, name)})" in shown(study, name)
+    }
+    assert {path.name for path in (DOCS / writer.FOLDER).iterdir()} == linked | WRITTEN_ELSEWHERE
 
 
 # ---- a toy study: its declaration and its function
@@ -179,24 +189,28 @@ def draw(folder, found):
 """
 
 
+TOYS = {"toy": Section("tables:table"), "fixed": Section("tables:fixed")}
+
+
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
     """A project of one page and one study."""
     (tmp_path / "docs").mkdir()
     page = tmp_path / "docs" / "toy.md"
     page.write_text("a\n<!-- figures: toy -->\nold\n<!-- end -->\n<!-- figures: fixed of 1234 -->\nb\n<!-- end -->\n")
-    (tmp_path / "toys").mkdir()
-    (tmp_path / "toys" / "made_toy.py").write_text(MAKES)
-    sections = {"toy": Section("toys/made_toy.py:table"), "fixed": Section("toys/made_toy.py:fixed")}
-    places = {"compute": "toys/made_toy.py:compute", "pictures": "toys/made_toy.py:draw"}
-    declared = Study("toy", title="Toys", page="toy.md", minutes=1, sections=sections, **places)
+    (tmp_path / "toys" / "toy").mkdir(parents=True)
+    for file, text in (("__init__", ""), ("toy/__init__", ""), ("toy/tables", MAKES)):
+        (tmp_path / "toys" / f"{file}.py").write_text(text)
+    places = {"compute": "tables:compute", "pictures": "tables:draw", "package": "toys"}
+    declared = Study("toy", title="Toys", page="toy.md", minutes=1, sections=TOYS, **places)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(studies, "STUDIES", {"toy": declared})
-    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.syspath_prepend(tmp_path)
     meaning._of.cache_clear()
     meaning._marks.cache_clear()
     yield page
-    sys.modules.pop("made_toy", None)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toys"]:
+        del sys.modules[name]
 
 
 def run(monkeypatch, *arguments):
@@ -226,14 +240,14 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     run(monkeypatch, "--all")
     capsys.readouterr()
     assert stale() == []
-    code = Path("toys/made_toy.py")
+    code = Path("toys/toy/tables.py")
     code.write_text(
         '"""Explained."""\nimport os\n# and more\n' + MAKES.replace("    return [1", '    "It."\n    return  [1')
     )
     assert stale() == []
     moved = MAKES.partition("def fixed")
-    code.write_text("from beside_toy import fixed, draw\n" + moved[0])
-    Path("toys/beside_toy.py").write_text("".join(moved[1:]))
+    code.write_text("from toys.toy.beside import fixed, draw\n" + moved[0])
+    Path("toys/toy/beside.py").write_text("".join(moved[1:]))
     assert stale() == []
     code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
     assert len(stale()) == 2
@@ -241,7 +255,7 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
 
 @pytest.mark.slow
 def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
-    from contactfpga_sim.lab import size
+    from contactfpga_sim.apps import size
     from contactfpga_sim.lab.closed import tables
 
     monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured
@@ -260,8 +274,8 @@ def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, ca
         run(monkeypatch, "toy")
     assert run(monkeypatch, "--all") == 0
     assert capsys.readouterr().err == "left out: toy needs no-such-program, no/such/folder\n"
-    without = {"toy": Section("toys/made_toy.py:table", needs=("no/such/folder",))}
-    part = Study("toy", title="T", page="toy.md", minutes=1, sections=without, compute=whole.compute)
+    without = {"toy": dataclasses.replace(TOYS["toy"], needs=("no/such/folder",))}
+    part = dataclasses.replace(whole, sections=without, pictures="")
     monkeypatch.setattr(studies, "STUDIES", {"toy": part})
     assert run(monkeypatch, "toy") == 0
     assert capsys.readouterr().out == "toy.md: toy stays as it is without no/such/folder\n"
@@ -269,9 +283,27 @@ def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, ca
 
 
 def test_a_package_that_is_not_installed_is_told_with_its_extra(toy, monkeypatch):
-    Path("toys/made_toy.py").write_text("import no_such_package_of_anybody")
+    Path("toys/toy/tables.py").write_text("import no_such_package_of_anybody")
     with pytest.raises(MissingExtra, match=r"^toy needs more than is installed; .*\[sim\]'"):
         run(monkeypatch, "toy")
+
+
+def test_studies_together_take_an_hour_but_those_made_apart():
+    assert sum(study.minutes for study in DECLARED if not study.apart) <= 60
+    assert {study.name for study in DECLARED if study.apart} == {"mutants", "sizes"}
+
+
+def test_a_study_that_is_made_apart_may_be_out_of_date_and_is_made_by_its_name(toy, monkeypatch, capsys):
+    with pytest.raises(ContactFPGAError, match=r"^pages are out of date; toy\.md: toy: make pages NAME=toy; toy\.md: "):
+        run(monkeypatch, "--check")
+    apart = dataclasses.replace(studies.STUDIES["toy"], apart=True, minutes=1e-9)
+    monkeypatch.setattr(studies, "STUDIES", {"toy": apart})
+    assert run(monkeypatch, "--check") == 0
+    assert run(monkeypatch, "--all") == 0
+    assert "old" in toy.read_text()
+    assert run(monkeypatch, "toy") == 0
+    assert "old" not in toy.read_text()
+    assert "; its limit on two cores is 1e-09" in capsys.readouterr().err
 
 
 def test_all_studies_are_listed_without_what_they_need(monkeypatch, capsys):

@@ -19,7 +19,7 @@ from contactfpga_sim.lab.tracking.scores import Nearest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/tracking.md"
 PITCH_MM = 10.0
-PAGE_RATES = ("100", "1,000", "10,000")
+PAGE_RATES = ("100", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
 """Norfair is compared where it is installed."""
 
@@ -173,7 +173,7 @@ def test_the_picture_shows_the_scores_of_the_tables_file(tmp_path, monkeypatch):
         lines = [line for line in file if line.startswith("`crossing`,")]
     norfair = [float(re.findall(r"([\d.]+) ±", line)[3]) for line in lines]
     assert crossing.lines[3].get_ydata().tolist() == norfair
-    assert crossing.lines[3].get_xdata().tolist() == [25, 100, 1000, 10_000]
+    assert crossing.lines[3].get_xdata().tolist() == [25, 100, 10_000]
 
 
 def test_ten_thousand_frames_per_second_with_two_contacts():

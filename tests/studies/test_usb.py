@@ -10,8 +10,8 @@ from bridge_oracle import brute
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import Bridge
-from contactfpga_sim.lab.spread import MixedTimes, Spread, summed
-from contactfpga_sim.lab.usb import BridgeChip, BridgeSettings, ByteStream, delivered
+from contactfpga_sim.apps.latency.spread import MixedTimes, Spread, summed
+from contactfpga_sim.apps.latency.usb import BridgeChip, BridgeSettings, ByteStream, delivered
 
 MHZ = 12
 CLOCK_HZ = MHZ * 1_000_000

@@ -5,12 +5,12 @@ import random
 from concurrent.futures import ThreadPoolExecutor
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.fit import sources
-from contactfpga_sim.lab.fit.candidates import candidates, pitches_for, size_for
-from contactfpga_sim.lab.fit.search import fit
-from contactfpga_sim.lab.fit.sources import source
-from contactfpga_sim.lab.fit.trial import FitTask, Goals
+from contactfpga_sim.apps.fit import sources
+from contactfpga_sim.apps.fit.candidates import candidates, pitches_for, size_for
+from contactfpga_sim.apps.fit.search import fit
+from contactfpga_sim.apps.fit.sources import source
+from contactfpga_sim.apps.fit.trial import FitTask, Goals
+from contactfpga_sim.apps.speed import Speed
 
 BUMPER = 'width_mm = 80\nheight_mm = 80\ncount = 100\n[[contact]]\nshape = "disc"\nradius_mm = [12, 18]\n'
 SECOND = '[[contact]]\nshape = "disc"\nradius_mm = 12\n'

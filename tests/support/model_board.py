@@ -3,7 +3,7 @@
 from wire import EPOCH_US, Wire, taken_in
 
 import contactfpga
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga_sim.model.golden.request import heard
 from contactfpga_sim.model.golden.uart import pulsed
 
@@ -114,10 +114,6 @@ class DirectPort(ModelBoard):
 SKIN = contactfpga.Skin()
 
 
-def arrived(events):
-    return [event.zones for event in events if isinstance(event, Arrival)]
-
-
 class Line:
     """A board whose bytes go straight to a conversation."""
 
@@ -128,7 +124,7 @@ class Line:
 
     def give(self, *packets):
         """Frames that the host passes on of these bytes."""
-        return arrived(self.host.receive(b"".join(packets), self.now))
+        return frames_in(self.host.receive(b"".join(packets), self.now))
 
     def hello(self, **options):
         return self.host.receive(self.board.hello(**options), self.now)

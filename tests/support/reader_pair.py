@@ -1,4 +1,5 @@
-"""The two readers of a port side by side, in one process and with one clock, so that all they say can be compared."""
+"""The two readers of a port side by side, in one process and with one clock, so that all they say can be compared: the
+one decodes in Python alone, the other in C."""
 
 import random
 
@@ -6,6 +7,7 @@ from contactfpga.driver import native
 from contactfpga.driver.link import Link
 from contactfpga.driver.native import Port
 from contactfpga.driver.native_link import NativeLink
+from contactfpga.wire import table
 
 
 class Line:
@@ -44,6 +46,7 @@ class Pair:
         self.now = 0.0
         self.lines = Line(self._now), NativeLine(self._now)
         self.thread = Link(self.lines[0], skin)
+        self.thread.conversation.decode = table.decode
         self.native = NativeLink(self.lines[1], self.lines[1], skin)
 
     def _now(self):

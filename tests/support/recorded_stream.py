@@ -10,7 +10,9 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.tools.recordings.session import Session
+from contactfpga.recordings import Session
+from contactfpga.tools.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings.messages import BYTES, of_bytes
 
 SKIN = Skin()
 NAMES = ("left arm", "chest")
@@ -48,6 +50,16 @@ class StreamPort:
 
     def close(self):
         pass
+
+
+def written(path, sent, added=()):
+    """A closed recording of these bytes by link, and before them of the texts of links that were added in order."""
+    file = McapFile(path)
+    for link in added:
+        file.metadata("contactfpga", {"link": link})
+    for link, data in sent.items():
+        file.write(f"/{link}/bytes", BYTES, link, 5, of_bytes(data, 5, link), 0.0)
+    file.close()
 
 
 def recorded(tmp_path, port=None, seconds=None, name="touches.mcap", **options):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from contactfpga_sim.lab import beside
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.registry import StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -11,7 +11,11 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 def section(page, name):
     """The text of a section of a page in ``docs``, with the rows that are in a file beside it."""
-    return beside.whole(DOCS / page, name)
+    return writer.whole(DOCS / page, name)
+
+
+def cells(table):
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 
 def outdated(study, computed, *names):

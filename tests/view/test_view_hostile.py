@@ -10,9 +10,9 @@ from two_links import FLAT, ROBOT, ROUND, write_robot
 
 pytest.importorskip("viser")
 
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.body import packed
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.panel import as_markdown
 from contactfpga_sim.lab.view import browser

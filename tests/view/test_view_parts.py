@@ -16,7 +16,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.surfaces import Cone
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.fingers import Hand
-from contactfpga.tools.view.sources import CHART_S, MAX_LAG_S, MOMENT_S, Meter, SimulatedPace
+from contactfpga.tools.view.sources import CHART_S, Meter
 from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.batch import Batch
@@ -123,33 +123,6 @@ def test_a_drag_presses_while_it_lasts_several_do_at_once_and_a_finger_stays_whe
     assert sheet.fingers == [(90, 40, 20.0)]
 
 
-# ---- time
-
-
-def test_a_board_that_keeps_up_is_in_real_time():
-    now = [100.0]
-    pace = SimulatedPace(5.0, lambda: now[0])
-    simulated = 5.0
-    for _ in range(200):
-        now[0] += 0.02
-        simulated += pace.due(simulated)
-    assert simulated == pytest.approx(9.0)
-    assert pace.slip_s == 0
-    assert pace.share == pytest.approx(1, abs=0.01)
-
-
-def test_a_board_that_is_slower_slips_and_says_by_how_much():
-    now = [0.0]
-    pace = SimulatedPace(0.0, lambda: now[0])
-    simulated = 0.0
-    for _ in range(500):
-        due = pace.due(simulated)
-        simulated += due
-        now[0] += due / 0.4 if due > 0 else 0.02  # a machine that reaches 40 %
-    assert pace.share == pytest.approx(0.4, abs=0.02)
-    assert pace.slip_s == pytest.approx(now[0] - simulated, abs=3 * MAX_LAG_S)
-
-
 # ---- counters
 
 
@@ -221,15 +194,6 @@ def test_a_trail_shows_the_last_second_of_each_contact():
     assert moving[:, 0, 0].min() == pytest.approx(0.010)
     assert moving[:, 1, 0].max() == pytest.approx(0.030)
     assert math.dist(lines[-1][0], lines[-1][1]) == pytest.approx(0)
-
-
-def test_a_slow_machine_simulates_less_at_a_time():
-    """And no less than before, however long it takes to draw: else it would come to a stop."""
-    pace = SimulatedPace(0.0, lambda: 0.0)
-    assert pace.most_s == pytest.approx(MOMENT_S)
-    for _ in range(50):
-        pace.ran(pace.most_s, pace.most_s / 0.1)  # a tenth of real time
-    assert pace.most_s == pytest.approx(0.1 * MOMENT_S, rel=0.01)
 
 
 def test_latency_is_from_the_sample_to_the_last_byte():

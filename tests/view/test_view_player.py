@@ -9,7 +9,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.tools import cli
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.playback import Player
-from contactfpga.tools.view.replayed import ByteRecording, Clock
+from contactfpga.tools.view.replayed import load
 
 
 @pytest.fixture(scope="module")
@@ -22,36 +22,9 @@ def file(tmp_path_factory):
     return f"replay://{path}"
 
 
-@pytest.fixture(scope="module")
-def frames(file):
-    """Every frame, read as the driver reads it."""
-    with contactfpga.open(file) as board:
-        return list(board)
-
-
 @pytest.fixture
 def player(file, clock):
-    return Player(ByteRecording(file), clock=clock)
-
-
-def test_a_recording_begins_anywhere(file, frames):
-    recording = ByteRecording(file)
-    times = [(zones.time_us - frames[0].time_us) / 1e6 for zones in frames]
-    assert recording.count == len(frames)
-    assert recording.duration_s == pytest.approx(times[-1])
-    for start_s, end_s in ((0.0, None), (0.2, None), (0.2503, 0.3), (times[-1], None)):
-        found = [(seconds, zones.sequence) for seconds, zones in recording.frames(start_s, end_s)]
-        wanted = [
-            (pytest.approx(seconds), zones.sequence)
-            for seconds, zones in zip(times, frames)
-            if seconds >= start_s and (end_s is None or seconds <= end_s)
-        ]
-        assert found == wanted
-
-
-def test_time_goes_on_where_a_board_was_started_again():
-    clock = Clock()
-    assert [clock.take(time_us) for time_us in (5_000_000, 6_000_000, 100, 500_100)] == [0, 1, 1, 1.5]
+    return Player(load(file), clock=clock)
 
 
 def test_it_plays_in_its_own_time(player):

@@ -15,9 +15,9 @@ CELLS = Skin(report="cells")
 class Recording:
     """Frames of a made-up board, by their times in s."""
 
-    def __init__(self, frames, sheet=None, late=()):
+    def __init__(self, frames, sheet=None, timed=True):
         self.title, self.sheet = "/somewhere/made-up.bin", sheet or Skin().sheet
-        self._frames, self._late = frames, late
+        self._frames, self.timed = frames, timed
 
     @property
     def duration_s(self):
@@ -25,9 +25,6 @@ class Recording:
 
     def frames(self, start_s=0.0, end_s=None):
         return ((seconds, zones) for seconds, zones in self._frames if start_s <= seconds <= (end_s or np.inf))
-
-    def lateness(self):
-        return iter(self._late)
 
 
 def recorded(count, places):
@@ -53,6 +50,17 @@ def test_where_and_for_how_long(monkeypatch):
     assert np.flatnonzero(found.rows[:, 0]).tolist() == [4]
     assert np.flatnonzero(found.rows[:, -1]).tolist() == [1, 11]
     assert found.lost.sum() == 0
+
+
+@pytest.mark.parametrize("chunk", [3, 2000])
+def test_a_piece_that_came_late_shows(monkeypatch, chunk):
+    """The first piece has five frames, of which only the last one's moment is known."""
+    monkeypatch.setattr("contactfpga.tools.view.plot.CHUNK", chunk)
+    frames = [(max(0.0, seconds - 0.004), zones) for seconds, zones in recorded(50, lambda _: [])]
+    frames[20:30] = [(seconds + 0.002, zones) for seconds, zones in frames[20:30]]
+    late = np.array(Touches.of(Recording(frames)).late)
+    assert late[:, 1].tolist() == pytest.approx([-0.004, -0.002, -0.004])
+    np.testing.assert_allclose(late[:, 0], [0, 0.018, 0.026], atol=0.0011)
 
 
 def test_a_barycenter_over_the_seam_lies_in_the_nearer_column():
@@ -103,14 +111,14 @@ def test_cells_count_by_themselves():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("late", [(), [(0.1, 0.0), (0.2, 0.004)]])
-def test_it_is_drawn_and_says_what_is_not_known(tmp_path, late):
+@pytest.mark.parametrize("timed", [False, True])
+def test_it_is_drawn_and_says_what_is_not_known(tmp_path, timed):
     plot = pytest.importorskip("contactfpga.tools.view.plot")
     frames = recorded(500, lambda number: [(number / 50, 5)])
-    path = plot.draw(Recording(frames, late=late), tmp_path / "plot.svg")
+    path = plot.draw(Recording(frames, timed=timed), tmp_path / "plot.svg")
     text = path.read_text()
     assert "made-up.bin: 16x16 cells, 500 frames in 0.5 s" in text
-    assert ("the file has no delays" in text) == (not late)
+    assert ("the file has no delays" in text) == (not timed)
 
 
 def test_the_command_draws_a_recording_and_refuses_what_is_none(tmp_path, capsys, monkeypatch):

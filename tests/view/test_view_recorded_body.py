@@ -10,9 +10,10 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 
 pytest.importorskip("viser")
 
+from contactfpga.recordings import Recording, Session
 from contactfpga.robot.body import Body, BodyError, packed
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.tools.recordings import Recording, Session, recorder
+from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.bodies import BodyPlayer, pushes
 from contactfpga.tools.view.playback import Player
@@ -27,7 +28,7 @@ def record(folder, about=None):
     path.write_text(ROBOT.replace("[[links]]", TIMES))
     ports = {"arm": StreamPort(ROUND, frames=1000), "chest": StreamPort(FLAT, frames=200)}
     with pytest.MonkeyPatch.context() as changed:
-        changed.setattr(recorder, "_epoch_ns", lambda board: 10**18)
+        changed.setattr(link_recorder, "offset_ns", lambda *clocks: 10**18)
         with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
             for name, port in ports.items():
                 session.add(port, name=name)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.model.board import cache
 from contactfpga_sim.model.board.cache import CacheError
 

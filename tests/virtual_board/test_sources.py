@@ -185,7 +185,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     ],
 )
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
-    key = f"__import__('contactfpga_sim.lab.kept', fromlist=['']).made_by({module!r})"
+    key = f"__import__('contactfpga_sim.apps.kept', fromlist=['']).made_by({module!r})"
     paths = [(copy / "sim/contactfpga_sim/lab" / name).resolve() for name in files]
     page = copy / "sim/contactfpga_sim/lab/flips/tables.py"
     now, changed = keys(copy, key, [*paths, page])

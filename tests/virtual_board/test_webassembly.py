@@ -17,7 +17,7 @@ import pytest
 from sample import sample
 from terminals import on_terminal
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga_sim import carried, demo
@@ -306,8 +306,8 @@ def test_the_c_header_decodes_as_python_does(both):
     shown = scene(Skin(), "moving")
     board.hold(np.array([shown(number / 5000) for number in range(400)]), 2400)
     received = board.take("received")["data"].astype(np.uint8).tobytes()
-    arrived = (one for one in Conversation("replay", live=False).receive(received, 0.0) if isinstance(one, Arrival))
-    python = [[(zone.area_cells, zone.x_mm, zone.y_mm) for zone in one.zones] for one in arrived]
+    arrived = frames_in(Conversation("replay", live=False).receive(received, 0.0))
+    python = [[(zone.area_cells, zone.x_mm, zone.y_mm) for zone in zones] for zones in arrived]
     decoder = webassembly.WebAssemblyLibrary(webassembly.path_of(carried.DECODER))
     decoder.zone_x_mm.restype = decoder.zone_y_mm.restype = ctypes.c_double
     decoder.decode_init()

@@ -9,7 +9,7 @@ from sample import sample
 from wire import Wire, check, crc16
 
 from contactfpga import Skin
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 
 REFERENCE = Skin()
 SKINS = {
@@ -45,8 +45,8 @@ class Line:
         """What arrives when the frame that is hit comes as these bytes: frames as text, and the counters."""
         host = Conversation("x")
         events = host.receive(self.hello + self.before + hit + self.behind, 0.0)
-        arrived = [event.zones for event in events if isinstance(event, Arrival)]
-        return [repr(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in arrived], host.stats
+        told = [repr(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in frames_in(events)]
+        return told, host.stats
 
     def lost(self, hit):
         """Numbers of the frames that do not arrive; whatever arrives was sent, in order, and is counted right."""

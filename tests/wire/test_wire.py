@@ -8,9 +8,10 @@ from sample import sample
 from wire import Wire, crc16, line, request, taken_in
 
 import contactfpga
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
+from contactfpga.zones.run import Run
 from contactfpga_sim.model.golden.request import command
 
 SKINS = {
@@ -85,8 +86,8 @@ class AnyTime:
     def take_hello(self, hello, now, fresh):
         pass
 
-    def take_frame(self, frame, widths, now):
-        return frame.time_us
+    def take(self, packets, widths, last, came_s):
+        return packets["time_us"]
 
 
 def accepted(name, stream):
@@ -94,10 +95,9 @@ def accepted(name, stream):
     host = Conversation("x")
     host.receive(Wire(SKINS[name]).hello(sent=7, heard=1000), 0.0)
     host._timeline = AnyTime()
-    return {
-        repr(said(event.zones) | {"heard": event.zones.frame.heard}) if isinstance(event, Arrival) else repr(event)
-        for event in host.receive(stream, 0.0)
-    }
+    events = host.receive(stream, 0.0)
+    found = {repr(said(zones) | {"heard": zones.frame.heard}) for zones in frames_in(events)}
+    return found | {repr(event) for event in events if not isinstance(event, Run)}
 
 
 def said(zones):

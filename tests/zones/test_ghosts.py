@@ -13,7 +13,7 @@ from zone_oracles import moments
 
 from contactfpga import Skin
 from contactfpga.boards import BOARDS
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import HelloReader
 from contactfpga_hdl.board.build import plan_for
@@ -39,7 +39,7 @@ def received(skin, *frames, **options):
             data += wire.cells(cells, **options)
         else:
             data += wire.zones([moments(zone) for zone in zones_of(cells)], **options)
-    return [event.zones for event in host.receive(data, 0.0) if isinstance(event, Arrival)]
+    return frames_in(host.receive(data, 0.0))
 
 
 def zones_of(cells):
@@ -123,7 +123,7 @@ def test_frames_with_zones_missing_or_wrong_are_all_suspect():
     frames = b"".join(
         wire.zones([(1, 0, 0)], zones=4, cells=4, flags=["overflow"], sequence=number, time=number) for number in (0, 1)
     )
-    zones = host.receive(wire.hello() + frames, 0.0)[-1].zones
+    zones = frames_in(host.receive(wire.hello() + frames, 0.0))[-1]
     assert zones[0].ghost
     assert zones.flags == {"overflow", "ghost"}
 

@@ -49,11 +49,8 @@ def flagged(skin, frames, runs=False, **sent):
     hello, found = packets(skin, frames, **sent)
     host = Conversation("x")
     host.receive(hello, 0.0)
-    if not runs:
-        return ["motion" in event.zones.flags for data in found for event in host.receive(data, 0.0)]
-    events = host.receive_runs(b"".join(found), 0.0)
-    each = [one for event in events for one in ([event.zones] if hasattr(event, "zones") else event)]
-    return ["motion" in one.flags for one in each]
+    pieces = [b"".join(found)] if runs else found
+    return ["motion" in zones.flags for data in pieces for run in host.receive(data, 0.0) for zones in run]
 
 
 @pytest.mark.parametrize("skin", SKINS, ids=IDS)
@@ -97,8 +94,8 @@ def test_a_run_that_was_begun_keeps_the_frame_before():
     hello, found = packets(MOMENTS, frames)
     host = Conversation("x")
     host.receive(hello, 0.0)
-    events = host.receive_runs(b"".join(found), 0.0)
-    run = next(event for event in events if not hasattr(event, "zones"))
+    run = host.receive(b"".join(found), 0.0)[-1]
+    assert len(run) == len(frames) - 1
     for taken in range(1, len(run)):
         assert ["motion" in one.flags for one in run.after(taken)] == ["motion" in one.flags for one in run][taken:]
 
@@ -109,8 +106,8 @@ def test_a_zone_without_cells_lies_nowhere():
     host.receive(hello, 0.0)
     for number in range(2):
         data = wire.zones([(0, 0, number)], cells=0, time=100 * number + 1, sequence=number, flags=["mismatch"])
-        (event,) = host.receive(data, 0.0)
-        assert event.zones.flags == {"mismatch"}
+        ((zones,),) = host.receive(data, 0.0)
+        assert zones.flags == {"mismatch"}
 
 
 CLOSED = Skin(rows=16, columns=16, surface="cylinder", radius_mm=25.0, closed=True, settle_us=20.0)
@@ -133,5 +130,5 @@ def test_over_the_seam_the_short_way_counts_and_an_x_that_is_not_known_does_not(
     wire, host = Wire(CLOSED), Conversation("x")
     host.receive(wire.hello(sent=0), 0.0)
     frames = [wire.zones([one], time=100 + 200 * number, sequence=number) for number, one in enumerate((first, second))]
-    _, after = [event.zones for data in frames for event in host.receive(data, 0.0)]
+    _, after = [zones for data in frames for run in host.receive(data, 0.0) for zones in run]
     assert ("motion" in after.flags) is moves

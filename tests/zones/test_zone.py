@@ -29,8 +29,8 @@ CYLINDER = SKIN.replace(surface="cylinder", radius_mm=RADIUS_MM)
 def zones_of(moments, skin=SKIN, **options):
     host, wire = Conversation("x"), Wire(skin)
     host.receive(wire.hello(sent=options.get("sequence", 0)), 0.0)
-    (arrival,) = host.receive(wire.zones(moments, **options), 0.0)
-    return arrival.zones
+    ((zones,),) = host.receive(wire.zones(moments, **options), 0.0)
+    return zones
 
 
 def test_area_and_barycenter_in_mm():
@@ -168,9 +168,9 @@ def test_the_table_says_why_a_zone_has_no_x(turned, name):
     skin = contactfpga.Skin(surface="cylinder", radius_mm=40.0, closed=True)
     host, wire = Conversation("x"), Wire(skin)
     host.receive(wire.hello(), 0.0)
-    (event,) = host.receive(wire.zones([(16, 120, 80, turned)]), 0.0)
+    ((zones,),) = host.receive(wire.zones([(16, 120, 80, turned)]), 0.0)
     console = Console(file=io.StringIO(), width=200)
-    console.print(table(event.zones))
+    console.print(table(zones))
     assert console.file.getvalue().splitlines()[-2].split()[1:-1:2] == ["16", "2513.27", name, "50.00"]
 
 
@@ -185,7 +185,7 @@ def test_zones_of_cells_are_found_on_the_host_as_scipy_finds_them(rng, connectiv
         cells = np.array([[rng.random() < rng.choice([0.3, 0.6]) for _ in range(columns)] for _ in range(rows)])
         host, wire = Conversation("x"), Wire(skin)
         host.receive(wire.hello(), 0.0)
-        zones = host.receive(wire.cells(cells.tolist()), 0.0)[0].zones
+        ((zones,),) = host.receive(wire.cells(cells.tolist()), 0.0)
         expected = zones_by_scipy(cells, connectivity)
         assert zones.total_zones == len(zones) == len(expected)
         assert sorted((zone.area_cells, zone.sum_x, zone.sum_y) for zone in zones) == expected

@@ -19,6 +19,8 @@ NAME, USB = "name:", "usb:"
 """Prefixes of ports that have to be searched (:mod:`contactfpga.driver.finding`)."""
 SIM, REPLAY, NET, FLEXITAC = "sim:", "replay://", "zenoh://", "flexitac://"
 """Prefixes of the other addresses."""
+MAX_LINKS, MAX_NAME = 64, 256
+"""Most links of a robot or of a recording, and most characters of a link's name, which tables repeat in each row."""
 
 
 def searched(port: object) -> bool:

@@ -9,8 +9,8 @@ from typing import Protocol, TypeVar, runtime_checkable
 
 from contactfpga.driver.events import SideEvent
 from contactfpga.driver.facts import BoardFacts
-from contactfpga.driver.link import Link
-from contactfpga.driver.subscription import Subscription, checked, frame_of
+from contactfpga.driver.link import Link, frame_of
+from contactfpga.driver.subscription import Subscription, checked
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
 from contactfpga.instruments.self_test import SelfTest
@@ -67,8 +67,8 @@ class Board(BoardFacts):
         timeout = checked(timeout)
         if not self.live:
             return self.next(timeout)
-        zones = frame_of(self._link.read(timeout))
-        self._frames.skip_to(zones)
+        zones, number = self._link.read(timeout)
+        self._frames.skip_to(number)
         return zones
 
     def next(self, timeout: float = 1.0) -> Zones:
@@ -185,7 +185,8 @@ class Board(BoardFacts):
     def greet(self, timeout: float) -> None:
         """Wait for the hello; the frame that answers the request stays for :meth:`next`."""
         if self.live:
-            self._frames.put_back(self.read(timeout))
+            _, number = self._link.read(timeout)
+            self._frames.skip_to(number - 1)
             return
         try:
             self._link.wait_for(lambda: self._link.conversation.hello, math.inf, timeout)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,38 +83,41 @@ class Timeline:
             self.before, self._last_us, first = None, -1, 0
         self._stats.lost += max(0, hello.sent - first - self._waiting)
 
-    def take_frame(self, frame: Frame, widths: Widths, now: float) -> int | None:
-        """The frame's time since power-up in us; None if it cannot be explained."""
-        time_us = self._explain(frame, now)
-        if time_us is None:
+    def take(self, packets: np.ndarray, widths: Widths, last: Frame, came_s: tuple[float, float]) -> np.ndarray | None:
+        """Times since power-up in us of frames that continue the first one (:func:`run_ends`); None if it cannot be
+        explained.
+
+        ``packets``: of :data:`contactfpga.wire.table.FIELDS`, at least one; ``last``: their last frame; ``came_s``:
+        arrival of the first and the last one.
+        """
+        _, time_us, sequence, heard, _, _, overwritten, *_ = packets[0].item()
+        first_us = self._explain(heard, time_us, sequence, came_s[0])
+        if first_us is None:
             self._known = False
-            self._waiting += 1
-            self._stats.unexplained += 1
+            self._waiting += len(packets)
+            self._stats.unexplained += len(packets)
             return None
-        self._stats.frames += 1
-        self._stats.lost += self._gap(frame)
-        if self.before is not None:
-            gap = frame.overwritten - self.before.overwritten
-            self._stats.overwritten += gap % (1 << widths.overwritten_bits)
-        self._next += self._gap(frame) + 1
-        self._time_us = self._last_us = time_us
-        self._now, self.before = now, frame
-        return time_us
+        lost = (sequence - self._next) % _SEQUENCES
+        modulus = 1 << widths.overwritten_bits
+        replaced = 0 if self.before is None else (overwritten - self.before.overwritten) % modulus
+        times_us = np.array([first_us])
+        if len(packets) > 1:  # one alone is what comes most often
+            lost += int((np.diff(packets["sequence"]) - 1 & _SEQUENCES - 1).sum())
+            replaced += int((np.diff(packets["overwritten"]) & modulus - 1).sum())
+            times_us = np.append(times_us, np.diff(packets["time_us"]) & _WRAP_US - 1).cumsum()
+        self._stats.frames += len(packets)
+        self._stats.lost += lost
+        self._stats.overwritten += replaced
+        self._next += lost + len(packets)
+        self._time_us = self._last_us = int(times_us[-1])
+        self._now, self.before = came_s[1], last
+        return times_us
 
     def place(self, time_us: int) -> int | None:
         """The time since power-up in us from the low bits of a time close to now; None if unknown."""
         if not self._known or self._last_us < 0:
             return None
         return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
-
-    def expects(self, heard: int, time_us: int, sequence: int, now: float) -> bool:
-        """Whether a frame with this request number, time and number continues the last explained frame."""
-        if self.before is None or self._time_us is None or not self._known:
-            return False
-        soon = not self._live or now - self._now <= self._patience_s
-        if not heard and time_us < self.before.time_us and (sequence - self._next) % _SEQUENCES:
-            return False
-        return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
 
     @property
     def last(self) -> tuple[int, Frame, float] | None:
@@ -124,67 +128,43 @@ class Timeline:
             return None
         return self._time_us, self.before, self._now
 
-    def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
-        """Times since power-up in us of frames that continue one another (:func:`continues`) and the last explained
-        frame.
-
-        ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: their last frame.
-        """
-        assert self.before is not None
-        assert self._time_us is not None
-        before = self.before
-        lost = int((_steps(packets["sequence"], before.sequence, _SEQUENCES) - 1 & _SEQUENCES - 1).sum())
-        times_us = self._time_us + np.cumsum(_steps(packets["time_us"], before.time_us, _WRAP_US))
-        self._stats.frames += len(packets)
-        self._stats.lost += lost
-        overwritten = _steps(packets["overwritten"], before.overwritten, 1 << widths.overwritten_bits)
-        self._stats.overwritten += int(overwritten.sum())
-        self._next += lost + len(packets)
-        self._time_us = self._last_us = int(times_us[-1])
-        self._now, self.before = now, last
-        return times_us
-
-    def _gap(self, frame: Frame) -> int:
-        return (frame.sequence - self._next) % _SEQUENCES
-
-    def _explain(self, frame: Frame, now: float) -> int | None:
+    def _explain(self, heard: int, low_us: int, sequence: int, now: float) -> int | None:
+        """A frame's time since power-up in us, from its low bits."""
         if not self._known or (self._live and now - self._now > self._patience_s):
             return None
         before = self.before
         if before is not None:
-            if before.heard and not frame.heard:
+            if before.heard and not heard:
                 self._forgot = True
                 return None
             # A board that has heard no request begins again at 0 in a restart, and when its time wraps.
-            begins = frame.heard != before.heard or (not frame.heard and frame.time_us < before.time_us)
-            if self._gap(frame) and frame.time_us < BEGUN_US and begins:
+            begins = heard != before.heard or (not heard and low_us < before.time_us)
+            if (sequence - self._next) % _SEQUENCES and low_us < BEGUN_US and begins:
                 return None  # a frame was lost, or this is one of the first since a restart
         if self._time_us is None:  # from one epoch before the hello's to three after it
             first_us = (self._epoch - 1) * _EPOCH_US
-            time_us = first_us + (frame.time_us - first_us) % _WRAP_US
+            time_us = first_us + (low_us - first_us) % _WRAP_US
             return time_us if time_us > self._last_us else None
-        step_us = (frame.time_us - self._time_us) % _WRAP_US
+        step_us = (low_us - self._time_us) % _WRAP_US
         return self._time_us + step_us if 0 < step_us <= MOST_US else None
 
 
-def continues(packets: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether each frame's time follows from a known time of the one before.
+def run_ends(packets: np.ndarray) -> list[int]:
+    """For each packet, the end of the run of frames that begins with it; its own index if it is no frame. In a run each
+    frame's time follows from that of the one before.
 
-    ``packets``: consecutive ones, of :data:`contactfpga.wire.many.FIELDS`.
+    ``packets``: consecutive ones, of :data:`contactfpga.wire.table.FIELDS`.
     """
+    if len(packets) == 1:
+        return [int(packets["valid"][0])]
     valid, heard, time_us, sequence = (packets[name] for name in ("valid", "heard", "time_us", "sequence"))
-    found = np.zeros(len(packets), np.bool_)
     step_us = time_us[1:] - time_us[:-1] & _WRAP_US - 1
-    found[1:] = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
-    found[1:] &= (heard[1:] > 0) | (time_us[1:] > time_us[:-1]) | (sequence[1:] - sequence[:-1] & _SEQUENCES - 1 == 1)
-    return found
-
-
-def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
-    steps = values.copy()
-    steps[1:] -= values[:-1]
-    steps[0] -= before
-    return steps & modulus - 1
+    found = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
+    found &= (heard[1:] > 0) | (time_us[1:] > time_us[:-1]) | (sequence[1:] - sequence[:-1] & _SEQUENCES - 1 == 1)
+    after = np.arange(1, len(packets) + 1)
+    after[:-1][found] = len(packets)
+    ends: list[int] = np.where(valid, np.minimum.accumulate(after[::-1])[::-1], after - 1).tolist()
+    return ends
 
 
 MOST_PPM, USUAL_PPM = 200.0, 50.0
@@ -322,29 +302,15 @@ class ClockFit:
         self, times_us: np.ndarray, arrived_s: np.ndarray, wire_s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Call :meth:`arrived` for many frames after the first one; returns, before each of them, all fields of
-        :meth:`line` but the first. Frames that do not change the fit are handled together.
+        :meth:`line` but the first.
         """
-        count, at = len(times_us), 0
-        base_us, (base_s, rate, sigma_s) = np.empty(count, np.int64), np.empty((3, count))
-        while at < count:
-            devices_s = (times_us[at:] - self._base_us) / 1e6
-            excess_s = arrived_s[at:] - wire_s[at:] - self._base_s - devices_s
-            below_s = self._height_s + self._slope * (devices_s - self._fitted_s) - excess_s
-            telling = (np.floor(devices_s / PIECE_S) > self._piece) | (below_s > 0)
-            quiet = int(telling.argmax()) if telling.any() else count - at
-            known = slice(at, min(at + quiet + 1, count))
-            now_s = np.empty(known.stop - at)
-            now_s[0], now_s[1:] = self._newest.device_s, devices_s[: len(now_s) - 1]
-            bounds_s = self._height_s + self._slope * (now_s - self._fitted_s)
-            base_s[known] = self._base_s + now_s + bounds_s - self._least_s / 2
-            base_us[known] = self._base_us + np.rint(now_s * 1e6).astype(np.int64)
-            rate[known], sigma_s[known] = 1.0 + self._slope, math.sqrt(self._variance)
-            if quiet:
-                self._newest = _Point(float(devices_s[quiet - 1]), float(excess_s[quiet - 1]))
-            at += quiet
-            if at < count:
-                self.arrived(int(times_us[at]), float(arrived_s[at]), float(wire_s[at]))
-                at += 1
+        lines = []
+        for time_us, came_s, sent_s in zip(times_us.tolist(), arrived_s.tolist(), wire_s.tolist(), strict=True):
+            line = self.line(came_s)
+            assert line is not None
+            lines.append(line[1:])
+            self.arrived(time_us, came_s, sent_s)
+        base_us, base_s, rate, sigma_s = map(np.array, zip(*lines, strict=True))
         return base_us, base_s, rate, sigma_s
 
     @property
@@ -415,24 +381,26 @@ class HostClock:
         """Begin to take the packets that arrived together now."""
         self._line = None if self.fit is None else self.fit.line(now)
 
-    def take(self, time_us: int, size: int, now: float, asked_s: float | None) -> HostLine | None:
-        """Take a frame of ``size`` bytes, or the last one of a run. ``asked_s``: time of the request that it answers
-        first.
+    def take(self, sizes: Sequence[int], now: float, times_us: np.ndarray, asked_s: float | None) -> HostLine | None:
+        """Take successive frames of these sizes in bytes and times; ``asked_s``: time of the request that the first one
+        answers.
         """
         if self.fit is None:
             return None
-        self._latest = time_us, size
+        self._latest = int(times_us[0]), sizes[0]
         if self._line is None or asked_s is not None:  # else the last one of those that came at once says the most
             self.end(now)
             if asked_s is not None:
-                self.fit.answered(time_us, asked_s)
+                self.fit.answered(int(times_us[0]), asked_s)
             self._line = self.fit.line(now)
+        if len(sizes) > 1:
+            self._latest = int(times_us[-1]), sizes[-1]
         return self._line
 
     def take_reads(
         self, times_us: np.ndarray, sizes: np.ndarray, arrived_s: np.ndarray, counts: np.ndarray
     ) -> HostLines | None:
-        """The host's lines of successive reads that answer no request, after :attr:`begun`; None in a recording.
+        """The host's lines of successive reads that answer no request, after a frame; None in a recording.
         ``arrived_s`` and ``counts``: arrival and number of frames of each read; ``times_us`` and ``sizes``: time and
         bytes of its last frame.
         """
@@ -440,10 +408,6 @@ class HostClock:
             return None
         lines = self.fit.arrived_in_turn(times_us, arrived_s, sizes * self.byte_s)
         return HostLines(*(np.repeat(values, counts) for values in (arrived_s, *lines)))
-
-    @property
-    def begun(self) -> bool:
-        return self.fit is None or self.fit.begun
 
     def end(self, now: float) -> None:
         """End the packets that arrived together."""

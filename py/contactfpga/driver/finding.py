@@ -166,7 +166,7 @@ def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, He
             data = transport.read(left)
             if of_sheets.take(data, time.monotonic()):
                 return of_sheets.heard
-            for event in conversation.receive_runs(data, time.monotonic()):
+            for event in conversation.receive(data, time.monotonic()):
                 if isinstance(event, Hello):
                     return {device: event}
                 if isinstance(event, ContactFPGAError):

@@ -24,7 +24,7 @@ class FrameQueue:
         """Number of the last frame given by :meth:`show`; frames up to it are dropped."""
         self.others = 0
         """Number of waiting items that are no frames."""
-        self._items: collections.deque[Zones | Run | SideEvent | ContactFPGAError] = collections.deque()
+        self._items: collections.deque[Run | SideEvent | ContactFPGAError] = collections.deque()
         self._giving = threading.Lock()  # lest one frame be shown and popped
         self._taken = 0  # frames of the run in front
         self._came = self._gone = came  # frames, which have numbers from 1; those that wait no more
@@ -47,20 +47,15 @@ class FrameQueue:
             self.shown = number
             return True
 
-    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
+    def put(self, item: Run | SideEvent | ContactFPGAError) -> None:
         self._items.append(item)
-        if isinstance(item, (Zones, Run)):
-            self._came += _count(item)
+        if isinstance(item, Run):
+            self._came += len(item)
         else:
             self.others += 1
         self._drop_shown()
         while self._held > self.maxsize:
             self.dropped += self._drop(self._held - self.maxsize)
-
-    def put_back(self, zones: Zones) -> None:
-        self._unwrap()
-        self._items.appendleft(zones)
-        self._gone -= 1
 
     def pop(self) -> Zones | SideEvent | ContactFPGAError | None:
         """The next item; None if nothing waits."""
@@ -72,44 +67,24 @@ class FrameQueue:
         if not self._items:
             return None
         item = self._items[0]
-        if not isinstance(item, (Zones, Run)):
-            self.others -= 1
-            self._items.popleft()
-            return item
-        self._gone += 1
-        if isinstance(item, Zones):
-            self._items.popleft()
-            return item
-        zones = item[self._taken]
-        self._taken += 1
-        if self._taken == len(item):
-            self._items.popleft()
-            self._taken = 0
+        zones = item[self._taken] if isinstance(item, Run) else item
+        self._drop(1)
         return zones
 
-    def pop_frames(self) -> list[Zones | Run]:
+    def pop_frames(self) -> list[Run]:
         """All waiting frames up to the first error."""
-        found: list[Zones | Run] = []
+        found: list[Run] = []
         with self._giving:
             self._drop_shown()
             self._unwrap()
-            while self._items and isinstance(item := self._items[0], (Zones, Run)):
+            while self._items and isinstance(item := self._items[0], Run):
                 found.append(item)
-                self._items.popleft()
-                self._gone += _count(item)
+                self._drop(len(item))
         return found
 
     def first_error(self) -> ContactFPGAError | None:
         """The next item if it is an error, which stays in the queue."""
         return self._items[0] if self._items and isinstance(self._items[0], ContactFPGAError) else None
-
-    def skip_to(self, zones: Zones) -> None:
-        """Drop this frame, which is in no run, and all earlier ones."""
-        if not any(item is zones for item in self._items):
-            return
-        while self._items[0] is not zones:
-            self._drop(self._held)
-        self._drop(1)
 
     def keep_last(self) -> None:
         """Drop all but the last item, or raise the first error."""
@@ -125,7 +100,7 @@ class FrameQueue:
         """Drop a single waiting frame that arrived before ``moment``."""
         self._drop_shown()
         item = self._items[0] if self._held == 1 else None
-        if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
+        if isinstance(item, Run) and (arrived_s := item[self._taken].arrived_s) is not None and arrived_s < moment:
             self.clear()
 
     def clear(self) -> None:
@@ -140,14 +115,14 @@ class FrameQueue:
 
     def _drop(self, most: int) -> int:
         item = self._items[0]
-        if not isinstance(item, (Zones, Run)):
+        if not isinstance(item, Run):
             self._items.popleft()
             self.others -= 1
             return 0
-        count = min(most, _count(item) - self._taken)
+        count = min(most, len(item) - self._taken)
         self._gone += count
         self._taken += count
-        if self._taken == _count(item):
+        if self._taken == len(item):
             self._items.popleft()
             self._taken = 0
         return count
@@ -162,7 +137,3 @@ class FrameQueue:
             assert isinstance(run, Run)
             self._items[0] = run.after(self._taken)
             self._taken = 0
-
-
-def _count(item: Zones | Run) -> int:
-    return len(item) if isinstance(item, Run) else 1

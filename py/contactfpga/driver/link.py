@@ -13,7 +13,7 @@ from typing import Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.clock import ClockFit
-from contactfpga.driver.conversation import Arrival, Conversation, Event
+from contactfpga.driver.conversation import Conversation, Event
 from contactfpga.driver.events import SideEvent, Silence
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.driver.stats import NetCounters, Stats, refused
@@ -55,6 +55,8 @@ class _Waiter:
     def __init__(self, ticket: int):
         self.ticket = ticket
         self.found: Zones | ContactFPGAError | None = None
+        self.number = 0
+        """Number of the found frame on this link, from 1."""
 
     def look(self) -> Zones | ContactFPGAError | None:
         return self.found
@@ -76,7 +78,7 @@ class Link:
         self.changed = threading.Condition()
         """Lock of the whole state, notified on changes."""
         self._queues: weakref.WeakSet[FrameQueue] = weakref.WeakSet()
-        self.last: Zones | Run | None = None
+        self.last: Run | None = None
         self.last_s = transport.clock()
         self._frames = 0  # that came
         self._last_bytes = 0  # that had come by then
@@ -114,8 +116,10 @@ class Link:
         self.check_open()
         return self.transport.clock()
 
-    def read(self, timeout: float) -> Result:
-        """Request a frame; returns the first one scanned after now, or an error."""
+    def read(self, timeout: float) -> tuple[Zones, int]:
+        """Request a frame; returns the first one scanned after now, and its number on this link. Raises what came in
+        its place.
+        """
         deadline = self.clock() + timeout
         with self.changed:
             self.check_open()
@@ -123,7 +127,7 @@ class Link:
             self._waiters.append(waiter)
         try:
             self._send()
-            return self.wait_for(waiter.look, deadline, timeout)
+            return frame_of(self.wait_for(waiter.look, deadline, timeout)), waiter.number
         finally:
             with self.changed:
                 self._waiters.remove(waiter)
@@ -170,7 +174,7 @@ class Link:
 
     def silence(self, since: float) -> Silence:
         """Time without a frame, for a listener since that moment; the caller holds the lock."""
-        last = self.last[len(self.last) - 1] if isinstance(self.last, Run) else self.last
+        last = None if self.last is None else self.last[len(self.last) - 1]
         seconds = self.transport.clock() - max(since, self.last_s)
         return Silence(self.transport.name, seconds, self.conversation.stats.bytes - self._last_bytes, last)
 
@@ -278,7 +282,7 @@ class Link:
         return 0 if self.net is None else self.net.denied
 
     def _take(self, data: bytes) -> None:
-        for event in self.conversation.receive_runs(data, self.transport.clock()):
+        for event in self.conversation.receive(data, self.transport.clock()):
             self._pass_on(event)
         self.changed.notify_all()
         if not self.transport.threaded:
@@ -302,29 +306,27 @@ class Link:
             while self._reading is None and self._read_once(0.0):
                 pass
 
-    def _pass_on(self, event: Event | Run) -> None:
+    def _pass_on(self, event: Event) -> None:
         if isinstance(event, Hello):
             self._log(event)
             return
         if isinstance(event, Faults):
             self._log_fault(f"fault: {', '.join(event.names)}" if event else "")
-        item = event.zones if isinstance(event, Arrival) else event
-        between = isinstance(item, SideEvent)
+        between = isinstance(event, SideEvent)
         for queue in self._queues:
             if queue.all_events or not between:
-                queue.put(item)
+                queue.put(event)
         if between:
             return
-        if isinstance(item, (Zones, Run)):
-            self._frames += 1 if isinstance(item, Zones) else len(item)
-            self.last, self.last_s, self._last_bytes = item, self.transport.clock(), self.conversation.stats.bytes
-        if isinstance(event, Run):  # what it answers, the frame before it has answered
-            return
+        if isinstance(event, Run):
+            self._frames += len(event)
+            self.last, self.last_s, self._last_bytes = event, self.transport.clock(), self.conversation.stats.bytes
         for waiter in self._waiters:
             if waiter.found is not None:
                 continue
-            if isinstance(event, Arrival):
-                waiter.found = event.zones if event.answers >= waiter.ticket else None
+            if isinstance(event, Run):
+                if event.answers >= waiter.ticket:
+                    waiter.found, waiter.number = event[0], self._frames - len(event) + 1
             elif isinstance(event, ContactFPGAError) and self.conversation.sheet is None:
                 # Another Skin that can be read is no trouble for a new frame.
                 waiter.found = event
@@ -382,6 +384,20 @@ class Link:
 
 DROPPED: collections.deque[weakref.ref[Link]] = collections.deque(maxlen=64)
 """Links whose boards were dropped without being closed; while they live, their ports may be open."""
+
+
+def frame_of(found: object) -> Zones:
+    """The awaited frame; raises the error that came in its place."""
+    found = checked_item(found)
+    assert isinstance(found, Zones)
+    return found
+
+
+def checked_item(found: object) -> object:
+    """The awaited item; raises the error that came in its place."""
+    if isinstance(found, ContactFPGAError):
+        raise found
+    return found
 
 
 def check_command(name: str, hello: Hello | None, command: Command) -> None:

@@ -11,7 +11,7 @@ import ctypes
 import functools
 import os
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,13 +20,14 @@ import numpy as np
 from contactfpga.driver import forks
 from contactfpga.driver.address import Serial, parse
 from contactfpga.driver.clock import ClockFit
-from contactfpga.driver.conversation import Steady
 from contactfpga.driver.reads import READ, Reads
 from contactfpga.skin.derived import Widths
-from contactfpga.wire.many import FIELDS, PacketTable
-from contactfpga.wire.protocol import Frame
-from contactfpga.zones.run import frame_of
-from contactfpga.zones.zone import HostLine
+from contactfpga.skin.sheet import Sheet as SheetFacts
+from contactfpga.wire import table
+from contactfpga.wire.protocol import Frame, frame_of
+from contactfpga.wire.table import FIELDS, PacketTable
+from contactfpga.zones.units import UnitHistory
+from contactfpga.zones.zone import HostLine, Zones
 
 LIBRARY = Path(__file__).with_name("_reader.so")
 
@@ -40,6 +41,10 @@ _FRAME = struct.Struct("?7x8q")
 _NEWEST_AND_FRAME = struct.Struct("Qqqdqddd?7x8q")
 
 
+FrameFormat = tuple[Widths, bytes]
+"""Widths of frames, and first bytes of their check."""
+
+
 class Sheet(ctypes.Structure):
     """Format of frames for the decoder."""
 
@@ -50,6 +55,15 @@ class Sheet(ctypes.Structure):
             *("fraction_bits", "closed", "zone_capacity", "prefix"),
         )
     ]
+
+    @classmethod
+    def told(cls, widths: Widths, before: bytes) -> Sheet:
+        sheet = widths.sheet
+        report = ("moments", "cells", "barycenter").index(sheet.report)
+        return cls(
+            *(1, sheet.rows, sheet.columns, sheet.connectivity, report, sheet.barycenter_bits, sheet.closed),
+            *(sheet.zone_capacity, int.from_bytes(before, "little")),
+        )
 
 
 class Base(ctypes.Structure):
@@ -63,6 +77,25 @@ class Base(ctypes.Structure):
         ("came_s", ctypes.c_double),
         ("byte_s", ctypes.c_double),
     ]
+
+
+class Steady(NamedTuple):
+    """The meaning of frames while they change only counters and clocks, because each continues the last one."""
+
+    time_us: int
+    """Time of :attr:`before` since power-up."""
+    before: Frame
+    came_s: float
+    """Arrival of :attr:`before`, on the host's clock."""
+    fit: ClockFit
+    byte_s: float
+    sheet: SheetFacts
+    faults: tuple[str, ...]
+    history: UnitHistory | None
+
+    def zones(self, frame: Frame, time_us: int, before: Frame, line: HostLine) -> Zones:
+        """Zones of a frame, without counting it; ``before`` is the frame just before it."""
+        return Zones(frame, self.sheet, time_us, before, line, self.faults, self.history)
 
 
 class Newest(NamedTuple):
@@ -94,6 +127,8 @@ class Library:
         self.forked = function(keeps, "forked", None)
         self.feed = function(keeps, "feed", None, address, ctypes.c_char_p, ctypes.c_size_t, double)
         self.sheet = function(keeps, "sheet", None, address, ctypes.POINTER(Sheet))
+        decoded = ctypes.POINTER(Sheet), ctypes.c_char_p, ctypes.c_size_t, address, address, address
+        self.decode = function(keeps, "decode", None, *decoded)
         self.waiting = function(keeps, "waiting", ctypes.c_size_t, address)
         self.notice = function(keeps, "notice", ctypes.c_int, address, double)
         self.failure = function(keeps, "failure", ctypes.c_int, address)
@@ -132,6 +167,24 @@ def refusal(port: object) -> str:
     if not isinstance(port, str) or not isinstance(parse(port), Serial):
         return "only the bytes of a serial port come by themselves, from a descriptor that C can read"
     return missing()
+
+
+@functools.lru_cache(maxsize=1)
+def _compiled() -> bool:
+    return not missing()
+
+
+def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTable:
+    """:func:`contactfpga.wire.table.decode` in C, except for bitmaps, and without the library."""
+    if not widths.report.zones or not _compiled():
+        return table.decode(packets, widths, before)
+    data, columns = b"\0".join([*packets, b""]), len(widths.record_bits)
+    count = data.count(0)
+    found, starts = np.empty(count, FIELDS), np.empty(count + 1, np.int64)
+    records = np.empty((len(data) // widths.record_bytes, columns), np.int64)
+    told = Sheet.told(widths, before)
+    library().decode(told, data, len(data), found.ctypes.data, starts.ctypes.data, records.ctypes.data)
+    return PacketTable(found, starts, records[: starts[-1]])
 
 
 class NativeFit(ClockFit):
@@ -179,7 +232,7 @@ class Port:
         self._address = self._library.open(descriptor, now)
         if not self._address:
             raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
-        self._decodes: tuple[Widths, bytes] | None = None
+        self._decodes: FrameFormat | None = None
         self._columns, self._room = 3, 0
         self.taken = 0
         """Packets taken so far, including overwritten ones."""
@@ -230,28 +283,16 @@ class Port:
         """errno of a lost port, -1 at its end, 0 while it works."""
         return int(self._library.failure(self._address))
 
-    def decode(self, frame_format: tuple[Widths, bytes] | None) -> None:
+    def decode(self, frame_format: FrameFormat | None) -> None:
         """Set the frame format; see :attr:`contactfpga.driver.conversation.Conversation.frame_format`."""
+        if frame_format is not None and not frame_format[0].report.zones:
+            frame_format = None
         if frame_format == self._decodes:
             return
-        told = Sheet()
+        told, self._columns = Sheet(), 3
         if frame_format is not None:
-            widths, before = frame_format
-            sheet = widths.sheet
-            told = Sheet(
-                1,
-                sheet.rows,
-                sheet.columns,
-                sheet.connectivity,
-                ("moments", "cells", "barycenter").index(sheet.report),
-                sheet.barycenter_bits,
-                sheet.closed,
-                sheet.zone_capacity,
-                int.from_bytes(before, "little"),
-            )
-            self._columns, self._room = len(widths.record_bits), widths.max_items
-        else:
-            self._columns = 3
+            told = Sheet.told(*frame_format)
+            self._columns, self._room = len(frame_format[0].record_bits), frame_format[0].max_items
         self._make_room()
         self._library.sheet(self._address, ctypes.byref(told))
         self._decodes = frame_format
@@ -282,18 +323,18 @@ class Port:
         carried = sizes + packets * _WORD
         begun = carried + records * columns * _WORD
         data, end = begun + partial, begun + partial + length
-        table = None
+        packet_table = None
         if self._decodes is not None:
             rows = np.frombuffer(memory, np.int64, records * columns, carried).reshape(-1, columns)
             found = np.frombuffer(memory, FIELDS, packets, fields)
-            table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
+            packet_table = PacketTable(found, np.frombuffer(memory, np.int64, packets + 1, starts), rows)
         came = Reads(
             first_byte,
             first_packet,
             np.frombuffer(memory, READ, count, reads),
             memory[data:end].tobytes(),
             self._decodes,
-            table,
+            packet_table,
             np.frombuffer(memory, np.int64, packets, sizes),
         )
         missing = first_byte - self._bytes if gap else 0

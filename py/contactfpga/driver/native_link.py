@@ -13,11 +13,11 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
-from contactfpga.driver.conversation import Arrival, Conversation, Steady
+from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.events import Silence
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.driver.link import READ_S, Link, Result, timed_out
-from contactfpga.driver.native import NativeFit, Port, Unsettled
+from contactfpga.driver.native import NativeFit, Port, Steady, Unsettled
 from contactfpga.driver.reads import Reads
 from contactfpga.driver.recording import RecordingTransport
 from contactfpga.driver.transport import SerialTransport, Transport
@@ -121,10 +121,10 @@ class NativeLink(Link):
         if self._record is not None:
             for at in range(len(reads)):
                 self._record(reads.data_of(at), reads.at_s[at])
-        for at_s, events in said.receive_reads(reads):
+        for at_s, events in said.take(reads):
             for event in events:
                 self._pass_on(event)
-                if isinstance(event, (Arrival, Run)):
+                if isinstance(event, Run):
                     self._last_s = at_s
         with self._showing:
             self._core.decode(said.frame_format)

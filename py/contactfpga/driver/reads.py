@@ -7,9 +7,9 @@ import functools
 
 import numpy as np
 
-from contactfpga.driver.clock import MOST_S
+from contactfpga.driver.clock import MOST_S, run_ends
 from contactfpga.skin.derived import Widths
-from contactfpga.wire.many import PacketTable
+from contactfpga.wire.table import PacketTable
 
 PAUSED, NOISE = 1, 2
 """Flags of a read: after a pause that makes times ambiguous; with too many bytes without a delimiter."""
@@ -22,8 +22,8 @@ READ = np.dtype([("at_s", "<f8"), ("bytes", "<i8"), ("packets", "<i8"), ("record
 class Reads:
     """Consecutive reads.
 
-    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes. ``decoded``: each
-    packet's fields, its bytes in (n,) ``sizes``, and whether it is a whole frame by ``frame_format``.
+    ``reads``: of :data:`READ`, after ``bytes_before`` and ``packets_before``; ``data``: all bytes. ``table``: each
+    packet's fields, and whether it is a whole frame by ``frame_format``; its bytes are in (n,) ``sizes``.
     """
 
     def __init__(
@@ -33,12 +33,12 @@ class Reads:
         reads: np.ndarray,
         data: bytes,
         frame_format: tuple[Widths, bytes] | None,
-        decoded: PacketTable | None,
+        table: PacketTable | None,
         sizes: np.ndarray,
     ):
         self.at_s: list[float] = reads["at_s"].tolist()
-        self.frame_format, self.decoded = frame_format, decoded
-        self._reads, self._data, self._sizes = reads, data, sizes
+        self.frame_format, self.table, self.sizes = frame_format, table, sizes
+        self._reads, self._data = reads, data
         self._bytes: list[int] = [0, *(reads["bytes"] - bytes_before).tolist()]
         self._packets: list[int] = [0, *(reads["packets"] - packets_before).tolist()]
 
@@ -55,10 +55,14 @@ class Reads:
     def data_of(self, at: int, end: int | None = None) -> bytes:
         return self._data[self._bytes[at] : self._bytes[at + 1 if end is None else end]]
 
-    def decoded_at(self, at: int) -> PacketTable | None:
-        if self.decoded is None or len(self) == 1:
-            return self.decoded
-        return self.decoded.part(self._packets[at], self._packets[at + 1])
+    def table_of(self, at: int) -> PacketTable | None:
+        return self.table and self.table.part(self._packets[at], self._packets[at + 1])
+
+    @functools.cached_property
+    def run_ends(self) -> list[int]:
+        """:func:`contactfpga.driver.clock.run_ends` of all packets."""
+        assert self.table is not None
+        return run_ends(self.table.packets)
 
     def last_within(self, at: int, packets: int) -> int:
         """End of the unflagged reads from this one on within the first ``packets`` packets, without long pauses; the
@@ -92,4 +96,4 @@ class Reads:
         counts = np.diff(by)
         some = counts > 0
         lasts = by[1:][some] - 1
-        return times_us[lasts - by[0]], self._sizes[lasts] + 1, self._reads["at_s"][at:end][some], counts[some]
+        return times_us[lasts - by[0]], self.sizes[lasts] + 1, self._reads["at_s"][at:end][some], counts[some]

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Generic, TypeVar, cast
 
 from contactfpga.driver.events import SideEvent, Silence
-from contactfpga.driver.link import Link
+from contactfpga.driver.link import Link, checked_item, frame_of
 from contactfpga.errors import BoardClosed, ContactFPGAError, NoData, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
 from contactfpga.wire.faults import Faults, SelfTestSlot
@@ -220,15 +220,9 @@ class Subscription(Listening[Zones]):
         silence = self._silence()
         raise NoData(f"{silence} (allowed are {max_age_s:g} s)", silence)
 
-    def put_back(self, zones: Zones) -> None:
-        """Make this frame the next one."""
-        with self._link.changed:
-            self._frames.put_back(zones)
-
-    def skip_to(self, zones: Zones) -> None:
-        """Drop this frame and all earlier ones."""
-        with self._link.changed:
-            self._frames.skip_to(zones)
+    def skip_to(self, number: int) -> None:
+        """Drop all frames up to this number; see :meth:`Link.read`."""
+        self._frames.show(number)
 
     def keep_last(self) -> None:
         """Drop all frames but the last; raises a pending error."""
@@ -246,20 +240,6 @@ def latest_scan_s(zones: Zones) -> float:
     """Latest possible scan time of a frame, on the port's clock."""
     at_s, sigma_s = zones.host_time_s, zones.host_sigma_s
     return math.inf if at_s is None or sigma_s is None else at_s + 2 * sigma_s
-
-
-def frame_of(found: object) -> Zones:
-    """The awaited frame; raises the error that came in its place."""
-    found = checked_item(found)
-    assert isinstance(found, Zones)
-    return found
-
-
-def checked_item(found: object) -> object:
-    """The awaited item; raises the error that came in its place."""
-    if isinstance(found, ContactFPGAError):
-        raise found
-    return found
 
 
 def checked(timeout: float) -> float:

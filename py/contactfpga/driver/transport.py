@@ -24,7 +24,7 @@ from contactfpga.skin import Skin
 
 SCHEMES = {
     "sim": "contactfpga_sim.model.board.virtual:board_at",
-    "replay": "contactfpga.driver.recording:ReplayTransport",
+    "replay": "contactfpga.tools.recordings.replay:ReplayTransport",
     "zenoh": "contactfpga.robot.net.port:ZenohPort",
     "flexitac": "contactfpga.driver.flexitac:FlexitacPort",
     "sheet": "contactfpga.driver.sheets:share",
@@ -210,7 +210,7 @@ class PacedTransport(SimTransport):
 
     def __init__(self, name: str, board: SimulatedPort, pace: float):
         super().__init__(name, board)
-        self._pace = Pace(self.clock(), pace, LAG_S)
+        self._pace = Pace(self.clock(), pace, most_lag_s=LAG_S)
 
     def read(self, timeout_s: float) -> bytes:
         """All bytes that are due, of at most :data:`MOMENT_S`, after at most ``timeout_s`` of real or simulated

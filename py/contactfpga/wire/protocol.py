@@ -48,6 +48,7 @@ __all__ = [
     "DELIMITER",
     "DIGIT_BITS",
     "EPOCH_DIGITS",
+    "FAULT",
     "FLAGS",
     "FLAG_BITS",
     "FLAG_SETS",
@@ -56,7 +57,10 @@ __all__ = [
     "KIND_BITS",
     "KIND_HELLO",
     "KIND_REQUEST",
+    "MISMATCH",
+    "MOTION",
     "NO_RECORDS",
+    "OVERFLOW",
     "REQUEST_HELLO",
     "SENT_DIGITS",
     "STATE_DIGITS",
@@ -72,10 +76,12 @@ __all__ = [
     "check_prefix",
     "cobs_decode",
     "cobs_encode",
+    "decode",
     "decode_frame",
     "digits",
     "encode_hello",
     "encode_request",
+    "frame_of",
     "kind_of",
     "last_byte",
     "may_number",
@@ -85,6 +91,7 @@ __all__ = [
 
 FLAGS = ("overflow", "mismatch", "fault", "motion")
 """Names of a frame's flags, lowest bit first."""
+OVERFLOW, MISMATCH, FAULT, MOTION = (1 << bit for bit in range(len(FLAGS)))
 
 KIND_REQUEST = 5
 REQUEST_HELLO = 1
@@ -137,9 +144,11 @@ class Frame:
     otherwise None."""
 
 
-def decode_frame(plain: bytes, widths: Widths) -> Frame:
-    """Read an unsealed frame of the sheet of ``widths``. Raises :class:`PacketError` if its length contradicts its zone
-    count, or, without a mismatch flag, its cells contradict its zones."""
+def decode(plain: bytes, widths: Widths) -> tuple[tuple[int, ...], list[list[int]]]:
+    """Read an unsealed frame of the sheet of ``widths``: a row of :data:`contactfpga.wire.table.FIELDS`, and its zone
+    records or bitmap rows. Raises :class:`PacketError` if its length contradicts its zone count, or, without a mismatch
+    flag, its cells contradict its zones.
+    """
     sheet = widths.sheet
     kind = KINDS[sheet.report]
     if kind_of(plain) != kind:
@@ -152,27 +161,43 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
         int.from_bytes(plain[body:-1], "little"),
         *(TIME_BITS, SEQUENCE_BITS, HEARD_BITS, widths.area_bits, widths.zones_bits),
     )
-    flags = FLAG_SETS[plain[-1] & (1 << len(FLAGS)) - 1]
+    flags = plain[-1] & (1 << len(FLAGS)) - 1
     expected = sheet.rows if sheet.report == "cells" else zones
     carried = min(expected, widths.max_items)
-    if items != carried or ("overflow" in flags) != (carried < expected):
-        raise PacketError("length", f"frame carries {items} items, states {expected} and the flags {sorted(flags)}")
+    if items != carried or bool(flags & OVERFLOW) != (carried < expected):
+        names = sorted(FLAG_SETS[flags])
+        raise PacketError("length", f"frame carries {items} items, states {expected} and the flags {names}")
     if zones > (0 if sheet.report == "cells" else sheet.max_zones()):
         raise PacketError("content", f"frame states {zones} zones; the sheet holds at most {sheet.max_zones()}")
-    frame = Frame(
+    records = _bitmap(plain[:body], widths) if sheet.report == "cells" else _records(plain[:body], widths)
+    if not flags & MISMATCH:
+        _check_sums(records, cells, flags, widths)
+    return (1, time_us, sequence, heard, cells, zones, overwritten, flags, items), records
+
+
+def decode_frame(plain: bytes, widths: Widths) -> Frame:
+    """:func:`decode` as a frame."""
+    fields, records = decode(plain, widths)
+    return frame_of(fields, np.array(records, np.int64), widths.sheet)
+
+
+def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Frame:
+    """A frame from a row of :data:`contactfpga.wire.table.FIELDS` and its (n, 3), (n, 4) or (rows, columns) records."""
+    _, time_us, sequence, heard, cells, zones, overwritten, flags, _ = fields
+    divided, bitmap = sheet.report == "barycenter", sheet.report == "cells"
+    frame = object.__new__(Frame)  # whose own way to begin takes most of the time of this
+    vars(frame).update(
         sequence=sequence,
         time_us=time_us,
-        flags=flags,
+        flags=FLAG_SETS[flags],
         overwritten=overwritten,
         heard=heard,
         zones=zones,
         cells=cells,
-        moments=_records(plain[:body], items, widths) if sheet.report == "moments" else no_records(sheet),
-        bitmap=_bitmap(plain[:body], widths) if sheet.report == "cells" else None,
-        barycenters=_barycenters(plain[:body], items, widths) if sheet.report == "barycenter" else None,
+        moments=no_records(sheet) if divided or bitmap or not len(records) else records,
+        bitmap=records.astype(bool) if bitmap else None,
+        barycenters=(records if len(records) else NO_RECORDS) if divided else None,
     )
-    if "mismatch" not in flags:
-        _check_sums(frame, widths)
     return frame
 
 
@@ -189,55 +214,46 @@ def no_records(sheet: Sheet) -> np.ndarray:
 FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
 
 
-def _check_sums(frame: Frame, widths: Widths) -> None:
+def _check_sums(records: list[list[int]], cells: int, flags: int, widths: Widths) -> None:
     sheet = widths.sheet
-    if frame.bitmap is not None:
-        carried = int(frame.bitmap.sum())
-        possible = carried == frame.cells
+    if sheet.report == "cells":
+        carried = sum(map(sum, records))
+        possible = carried == cells
     else:
-        most_x, most_y = sheet.columns - 1, sheet.rows - 1
-        if frame.barycenters is None:
-            area, x, y, *past = frame.moments.T.tolist()
-            inside = all(x <= a * most_x and y <= a * most_y for a, x, y in zip(area, x, y))
-            whole = (1 << widths.area_bits) - 1
-            inside &= all(t <= a or t == whole for cells in past for a, t in zip(area, cells))
-        else:
-            area, x, y = frame.barycenters.T.tolist()
-            bits = sheet.barycenter_bits
-            inside = all(x <= most_x << bits and y <= most_y << bits for x, y in zip(x, y))
-        carried = sum(area)
-        possible = (
-            all(area) and inside and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
-        )
-    if not possible or frame.cells > widths.cells:
-        raise PacketError("content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be")
+        carried = sum(record[0] for record in records)
+        possible = carried < cells if flags & OVERFLOW else carried == cells
+        possible &= all(_is_inside(record, widths) for record in records)
+    if not possible or cells > widths.cells:
+        raise PacketError("content", f"frame carries {carried} cells and states {cells}, or zones that cannot be")
 
 
-def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    if not zones:
-        return no_records(widths.sheet)
+def _is_inside(record: list[int], widths: Widths) -> bool:
+    sheet = widths.sheet
+    area, x, y, *past = record
+    scale = 1 << sheet.barycenter_bits if widths.report.divided else area
+    inside = area > 0 and x <= (sheet.columns - 1) * scale and y <= (sheet.rows - 1) * scale
+    return inside and all(cells <= area or cells == (1 << widths.area_bits) - 1 for cells in past)
+
+
+def _records(data: bytes, widths: Widths) -> list[list[int]]:
+    """Zone records; the area of all cells, sent as 0 with ``report = "barycenter"``, is restored."""
     size = widths.record_bytes
     *bits, last_bits = widths.record_bits
     rows = [_split(int.from_bytes(data[start : start + size], "little"), *bits) for start in range(0, len(data), size)]
-    if max(row[-1] for row in rows) >> last_bits:
+    if any(row[-1] >> last_bits for row in rows):
         raise PacketError("content", "a zone record is filled up with something other than zeros")
-    return np.array(rows, np.int64)
+    if widths.report.divided and widths.cells == 1 << widths.record_bits[0]:
+        rows = [[row[0] or widths.cells, *row[1:]] for row in rows]
+    return rows
 
 
-def _barycenters(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """(zones, 3) int64 with ``report = "barycenter"``; an area of all cells, sent as 0, is restored."""
-    records = _records(data, zones, widths)
-    if widths.cells == 1 << widths.record_bits[0] and zones:
-        records[records[:, 0] == 0, 0] = widths.cells
-    return records
-
-
-def _bitmap(data: bytes, widths: Widths) -> np.ndarray:
+def _bitmap(data: bytes, widths: Widths) -> list[list[int]]:
     raw = np.frombuffer(data, np.uint8).reshape(widths.sheet.rows, widths.bitmap_row_bytes)
     bits = np.unpackbits(raw, axis=1, bitorder="little")
     if bits[:, widths.sheet.columns :].any():
         raise PacketError("content", "a bitmap row is filled up with something other than zeros")
-    return bits[:, : widths.sheet.columns].astype(bool)
+    rows: list[list[int]] = bits[:, : widths.sheet.columns].tolist()
+    return rows
 
 
 def _split(word: int, *widths: int) -> list[int]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contactfpga import surfaces
-from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
+from contactfpga.wire.protocol import FAULT, MISMATCH, MOTION, OVERFLOW
 from contactfpga.zones import around, tables
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
@@ -99,6 +99,8 @@ class Batch:
     @classmethod
     def of(cls, frames: Sequence[Zones | Run]) -> Batch:
         """A batch of one sheet's frames."""
+        if (sheet := frames[0].sheet).report == "cells" or sheet.ghosts:  # of which a run does not hold the zones
+            frames = [zones for one in frames for zones in (one if isinstance(one, Run) else [one])]
         described = np.zeros(sum(len(one) if isinstance(one, Run) else 1 for one in frames), FRAME_DTYPE)
         counts = np.zeros(len(described), np.int64)
         faults: list[tuple[str, ...]] = []

@@ -10,28 +10,31 @@ import numpy as np
 
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
-from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
+from contactfpga.wire.protocol import Frame, frame_of
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import HostLine, HostLines, Zones
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """At least one frame, of a sheet with diodes and a report of zones."""
+    """At least one frame; those after the first carry the same answer and the same names of faults."""
 
     sheet: Sheet
     packets: np.ndarray
-    """(n,) valid packets of :data:`contactfpga.wire.many.FIELDS`."""
+    """(n,) valid packets of :data:`contactfpga.wire.table.FIELDS`."""
     starts: np.ndarray
     """(n + 1,) starts of each frame's records; the first may be above 0."""
     records: np.ndarray
-    """(m, 3) int64, or (m, 4) for a sheet whose ends meet."""
+    """(m, 3) int64, or (m, 4) for a sheet whose ends meet; (m, columns) bitmap rows with ``report = "cells"``."""
     times_us: np.ndarray
     line: HostLine | HostLines | None
     """Arrival times and times on the host's clock, for all frames or each; None in a recording."""
     before: Frame | None = None
     faults: tuple[str, ...] = (STUCK,)
     history: UnitHistory | None = None
+    answers: int = 0
+    """Highest ticket of :meth:`contactfpga.driver.conversation.Conversation.ask` that was issued before the frames were
+    scanned."""
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -75,23 +78,3 @@ class Run:
     @functools.cached_property
     def _plain(self) -> tuple[list[tuple[int, ...]], list[int], list[int]]:
         return self.packets.tolist(), self.starts.tolist(), self.times_us.tolist()
-
-
-def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Frame:
-    """A frame from a row of :data:`contactfpga.wire.many.FIELDS` and its records."""
-    _, time_us, sequence, heard, cells, zones, overwritten, flags, _ = fields
-    divided = sheet.report == "barycenter"
-    frame = object.__new__(Frame)  # whose own way to begin takes most of the time of this
-    vars(frame).update(
-        sequence=sequence,
-        time_us=time_us,
-        flags=FLAG_SETS[flags],
-        overwritten=overwritten,
-        heard=heard,
-        zones=zones,
-        cells=cells,
-        moments=no_records(sheet) if divided or not len(records) else records,
-        bitmap=None,
-        barycenters=records if divided else None,
-    )
-    return frame

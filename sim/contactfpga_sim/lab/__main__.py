@@ -8,12 +8,14 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
-from contactfpga_sim.lab import beside, meaning, pool, studies, writer
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab import meaning, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
@@ -49,10 +51,9 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
         if absent := lacking(section.needs):
             print(f"{page}: {name} stays as it is without {', '.join(absent)}", flush=True)
             continue
-        text = run.text(name)
-        if section.kept or section.heads:
-            file = DOCS / beside.FOLDER / f"{Path(page).stem}-{name}.csv"
-            text = beside.part(text, section.kept, file, section.heads)
+        made = run.made(name)
+        file = DOCS / writer.FOLDER / f"{Path(page).stem}-{name}.csv"
+        text = made.on_page(file) if isinstance(made, writer.Table) else writer.spelled(made)
         writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
         print(f"{page}: {name}", flush=True)
     if study.pictures:
@@ -72,6 +73,7 @@ def stale(study: Study) -> Iterator[str]:
 
 def listed(study: Study) -> str:
     needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
+    needs += "; made apart" if study.apart else ""
     return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
 
 
@@ -89,21 +91,34 @@ def main() -> int:
     if args.stale:
         print(*(line for study in chosen for line in stale(study)), sep="\n")
         return 0
+    if args.check:
+        if late := [line for study in chosen if not study.apart for line in stale(study)]:
+            raise StudyError("; ".join(["pages are out of date", *late]))
+        return 0
     if not (args.name or args.all):
         raise StudyError("name a study, or give --all or --list")
+    if not args.name:
+        chosen = [study for study in chosen if not study.apart]
     with _settings(args):
         return _make_all(chosen, strict=bool(args.name))
 
 
 def _make_all(chosen: Iterable[Study], strict: bool) -> int:
     for study in chosen:
+        begun = time.monotonic()
         try:
             make(study)
+            _judge(study, (time.monotonic() - begun) / 60)
         except (StudyError, MissingExtra) as error:
             if strict:
                 raise
             print(f"left out: {error}", file=sys.stderr, flush=True)
     return 0
+
+
+def _judge(study: Study, minutes: float) -> None:
+    if minutes > study.minutes:
+        print(f"{study.name} took {minutes:.1f} minutes; its limit on two cores is {study.minutes:g}", file=sys.stderr)
 
 
 @contextlib.contextmanager
@@ -121,9 +136,10 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m contactfpga_sim.lab", description="Make tables and pictures of the pages anew."
     )
     parser.add_argument("name", nargs="*", help="Study to make; --list shows them.")
-    parser.add_argument("--all", action="store_true", help="Make all studies that can be made here.")
+    parser.add_argument("--all", action="store_true", help="Make all that can be made here, but those made apart.")
     parser.add_argument("--list", action="store_true", help="List the studies, and make none.")
     parser.add_argument("--stale", action="store_true", help="List the sections that are out of date, and make none.")
+    parser.add_argument("--check", action="store_true", help="Refuse outdated sections, but those made apart.")
     parser.add_argument("--quick", action="store_true", help=f"Only those of at most {QUICK_MINUTES} minutes.")
     parser.add_argument("--fresh", action="store_true", help="Take no result that was kept from before.")
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Processes to use (default: one per core).")

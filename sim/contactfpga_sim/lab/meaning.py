@@ -26,7 +26,7 @@ def fingerprint(study: Study, section: str) -> str:
 
 
 def _netlists(study: Study, section: str) -> list[str]:
-    from contactfpga_sim.lab import size
+    from contactfpga_sim.apps import size
 
     with size.keys_alone() as keys, contextlib.redirect_stderr(io.StringIO()):
         StudyRun(study).text(section)
@@ -39,9 +39,7 @@ def _file(module: str) -> Path:
 
 @functools.cache
 def _of(modules: frozenset[str]) -> str:
-    scripts = [Path(module).resolve() for module in modules if "/" in module]
-    named = [module for module in modules if "/" not in module]
-    marks = {mark for file in sources.files(named, scripts) for mark in _marks(file)}
+    marks = {mark for file in sources.files(modules) for mark in _marks(file)}
     return _hashed("\n".join(sorted(marks)))
 
 

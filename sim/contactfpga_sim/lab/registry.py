@@ -1,7 +1,6 @@
-"""Entries of studies, in ``studies.py``; a study's folder is beside this file, unless scripts make all of it.
+"""Entries of studies, in ``studies.py``; a study's folder is beside this file.
 
-An entry names functions as ``module:function`` of its folder, or ``folder/file.py:function`` of the project's, so that
-reading it imports nothing.
+An entry names functions as ``module:function`` of its folder, so that reading it imports nothing.
 """
 
 from __future__ import annotations
@@ -10,15 +9,10 @@ import dataclasses
 import functools
 import importlib
 import inspect
-import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from contactfpga_sim.lab import writer
-
-NO_ROW = "^$"
-""":attr:`Section.kept` of a page that only links to the table."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,19 +20,20 @@ class Section:
     """Text between two markers of a page."""
 
     makes: str
-    """The function of its text, of the study's result or of nothing."""
+    """The function of its text or :class:`~contactfpga_sim.lab.writer.Table`, of the study's result or of nothing."""
     page: str = ""
     """Page in ``docs``; empty: the study's."""
     needs: tuple[str, ...] = ()
     """Needs beyond :attr:`Study.needs`; without one the section stays."""
     sample: str = ""
     """Function without arguments that makes part of the text in less than a minute."""
-    kept: str = ""
-    """Regular expression of rows to keep of its longest table; empty: all."""
-    heads: str = ""
-    """Regular expression of column headers to keep; empty: all."""
     of_netlists: bool = False
     """Whether netlists (:mod:`.size`), not reached code, date it."""
+
+
+def tables(names: str = "", **others: Section) -> dict[str, Section]:
+    """Sections by marker: of ``names`` each is made by ``tables:NAME_table``, and then ``others``."""
+    return {name: Section(f"tables:{name}_table") for name in names.split()} | others
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +46,7 @@ class Study:
     page: str
     """Page in ``docs``."""
     minutes: float
-    """Minutes on two cores without cached results."""
+    """Limit of its minutes on two cores without cached results."""
     sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
     """Sections by marker, in order of making."""
     compute: str = ""
@@ -62,23 +57,20 @@ class Study:
     """Extra of ``pyproject.toml`` with its imports."""
     needs: tuple[str, ...] = ()
     """Needed programs, and paths with a slash."""
+    apart: bool = False
+    """Whether it takes so long that only its name makes it, and a release may have it out of date."""
+    package: str = "contactfpga_sim.lab"
+    """Package of its folder."""
 
     def page_of(self, section: str) -> str:
         return self.sections[section].page or self.page
 
     def module(self, place: str) -> str:
-        """Module of a function, or its file."""
-        module = place.partition(":")[0]
-        return module if "/" in module else f"{__package__}.{self.name}.{module}"
+        """Module of a function."""
+        return f"{self.package}.{self.name}.{place.partition(':')[0]}"
 
     def function(self, place: str) -> Callable[..., Any]:
-        module, name = self.module(place), place.partition(":")[2]
-        if "/" in module:
-            file = Path(module).resolve()
-            if str(file.parent) not in sys.path:
-                sys.path.append(str(file.parent))
-            module = file.stem
-        found: Callable[..., Any] = getattr(importlib.import_module(module), name)
+        found: Callable[..., Any] = getattr(importlib.import_module(self.module(place)), place.partition(":")[2])
         return found
 
 
@@ -93,13 +85,20 @@ class StudyRun:
         return self.study.function(self.study.compute)()
 
     def call(self, place: str, *given: object) -> Any:
-        """Call a function; text is returned as pages spell it."""
+        """Call a function, with the study's result if it takes one."""
         function = self.study.function(place)
         parameters = inspect.signature(function).parameters.values()
         wanted = sum(one.default is one.empty for one in parameters)
-        found = function(*given, *([self.computed] if wanted > len(given) else []))
-        return writer.spelled(found) if isinstance(found, str) else found
+        return function(*given, *([self.computed] if wanted > len(given) else []))
+
+    def made(self, section: str) -> str | writer.Table:
+        found: str | writer.Table = self.call(self.study.sections[section].makes)
+        return found
 
     def text(self, section: str) -> str:
-        text: str = self.call(self.study.sections[section].makes)
-        return text
+        """All of the section's text, as pages spell it."""
+        return writer.spelled(str(self.made(section)))
+
+    def sampled(self, section: str) -> str:
+        """The part of the text that the section's sample makes."""
+        return writer.spelled(str(self.call(self.study.sections[section].sample)))

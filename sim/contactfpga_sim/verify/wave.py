@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
@@ -93,9 +93,9 @@ def _sent(skin: Skin, timeline: Timeline, touched: int) -> tuple[int, Zones]:
     while cycles <= MOST_CLOCKS:
         conversation = Conversation("the golden model")
         for cycle, byte in golden.predict(skin, timeline, cycles).bytes:
-            for event in conversation.receive(bytes([byte]), cycle / skin.clock_hz):
-                if isinstance(event, Arrival) and event.zones.pressed:
-                    return cycle + 12 * bits, event.zones
+            for zones in frames_in(conversation.receive(bytes([byte]), cycle / skin.clock_hz)):
+                if zones.pressed:
+                    return cycle + 12 * bits, zones
         cycles *= 2
     said = f"no frame with the touch comes within {MOST_CLOCKS:,} clocks"
     raise WaveError(f"{said}; a smaller sheet or a faster baud rate takes fewer, and masked cells make none")

@@ -14,7 +14,7 @@ from typing import Any
 
 from contactfpga.choices.choice import trusted
 from contactfpga.driver import forks
-from contactfpga.driver.mcap import MAX_LINKS
+from contactfpga.driver.address import MAX_LINKS
 from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 from contactfpga.inputs import tomlfile

@@ -14,9 +14,8 @@ import numpy as np
 from contactfpga import surfaces
 from contactfpga.choices.choice import trusting
 from contactfpga.design.cover import load_cover
-from contactfpga.driver.address import SheetOf, Sim
+from contactfpga.driver.address import MAX_NAME, SheetOf, Sim
 from contactfpga.driver.events import longest_pause_s
-from contactfpga.driver.mcap import MAX_NAME
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.robot.body.folds import Folds

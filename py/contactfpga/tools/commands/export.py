@@ -13,7 +13,7 @@ EXTRA = "analysis"
 
 
 def add_flags(flag: flags.Flags) -> None:
-    flag("RECORDING.mcap", "What `contactfpga record` wrote.")
+    flag("RECORDING", "File of `contactfpga record` or of `contactfpga zones --record`.")
     flag("OUT", "The table: OUT.parquet, OUT.npz or OUT.csv.", dest="table")
     flags.json(flag)
 

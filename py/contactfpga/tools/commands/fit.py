@@ -17,9 +17,9 @@ from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
-    from contactfpga_sim.lab.fit.candidates import Candidate
-    from contactfpga_sim.lab.fit.faces import Faces
-    from contactfpga_sim.lab.fit.trial import FitTask, SoFar
+    from contactfpga_sim.apps.fit.candidates import Candidate
+    from contactfpga_sim.apps.fit.faces import Faces
+    from contactfpga_sim.apps.fit.trial import FitTask, SoFar
 
 EXTRA = "chart"
 
@@ -79,9 +79,9 @@ def _candidate_flags(tried: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from contactfpga_sim.lab import pool
-    from contactfpga_sim.lab.fit import show
-    from contactfpga_sim.lab.fit.search import fit
+    from contactfpga_sim.apps import pool
+    from contactfpga_sim.apps.fit import show
+    from contactfpga_sim.apps.fit.search import fit
 
     output = outputs.file(args.output) if args.output else None
     task, tried = asked(args)
@@ -102,10 +102,10 @@ def run(args: argparse.Namespace) -> int:
 
 def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
     """The task and all candidates; raises ValueError for impossible requests."""
-    from contactfpga_sim.lab.fit import candidates
-    from contactfpga_sim.lab.fit.faces import feels
-    from contactfpga_sim.lab.fit.sources import Recorded, default_count, source
-    from contactfpga_sim.lab.fit.trial import FitTask, Goals
+    from contactfpga_sim.apps.fit import candidates
+    from contactfpga_sim.apps.fit.faces import feels
+    from contactfpga_sim.apps.fit.sources import Recorded, default_count, source
+    from contactfpga_sim.apps.fit.trial import FitTask, Goals
 
     base = Skin.load(args.skin) if args.skin else None
     sources = tuple(source(name, args.seed, args.threshold) for name in args.scenes)
@@ -135,8 +135,8 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
-    from contactfpga_sim.lab import covers
-    from contactfpga_sim.lab.fit import faces
+    from contactfpga_sim.apps import covers
+    from contactfpga_sim.apps.fit import faces
 
     cover = load_cover(args.skin) if args.skin else None
     if cover is not None:
@@ -148,7 +148,7 @@ def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
 
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:
-    from contactfpga_sim.lab.fit.candidates import METHODS, by
+    from contactfpga_sim.apps.fit.candidates import METHODS, by
 
     if not names:
         return list(METHODS)
@@ -164,7 +164,7 @@ def _share(percent: float | None) -> float | None:
 
 
 def _kept(so_far: SoFar, of: int, args: argparse.Namespace) -> str:
-    from contactfpga_sim.lab.fit import show
+    from contactfpga_sim.apps.fit import show
 
     again = "run the same command again to go on from there"
     if not so_far:

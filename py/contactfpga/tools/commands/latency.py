@@ -13,8 +13,8 @@ from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs, results
 
 if TYPE_CHECKING:
-    from contactfpga_sim.lab.finger.stages import Finger
-    from contactfpga_sim.lab.spread import Spread
+    from contactfpga_sim.apps.latency.spread import Spread
+    from contactfpga_sim.apps.latency.stages import Finger
 
 EXTRA = "sim"
 
@@ -42,9 +42,9 @@ def add_flags(flag: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from contactfpga_sim.lab import pool
-    from contactfpga_sim.lab.finger import host, stages
-    from contactfpga_sim.lab.usb import BridgeSettings
+    from contactfpga_sim.apps import pool
+    from contactfpga_sim.apps.latency import host, stages
+    from contactfpga_sim.apps.latency.usb import BridgeSettings
 
     path = _picture(args.picture)
     named, file = flags.board(args), flags.sheet_file(args)
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         touches = 0 if args.exact else host.TOUCHES
         found = stages.measure(skin, settings, args.cells, args.touches, host_touches=touches, step=step)
     if path is not None:
-        from contactfpga_sim.lab.finger import picture
+        from contactfpga_sim.apps.latency import picture
 
         sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.baud / 1e6:g} Mbaud"
         picture.save(found, f"{sheet}, {board.bridge.chip} of {board.title}", path)
@@ -82,7 +82,7 @@ def _board_lines(skin: Skin, cells: tuple[int, int], found: Finger) -> list[tupl
 
 
 def _host_lines(title: str, found: Finger, exact: bool) -> list[tuple[str, str]]:
-    from contactfpga_sim.lab.finger import stages
+    from contactfpga_sim.apps.latency import stages
 
     settings, share = found.settings, found.host
     event = "no event character" if settings.event is None else f"event character {settings.event}"

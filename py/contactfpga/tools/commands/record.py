@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from contactfpga.robot.body import Body
     from contactfpga.robot.body.plan import Plan
     from contactfpga.robot.ros.feed import Felt
+    from contactfpga.tools.recordings.recorder import Session
     from contactfpga.tools.recordings.recover import RecoveryReport
-    from contactfpga.tools.recordings.session import Session
 
 EXTRA = "record"
 
@@ -49,8 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _record(args: argparse.Namespace) -> int:
     from contactfpga.robot.body import packed
-    from contactfpga.tools.recordings.recorder import Split
-    from contactfpga.tools.recordings.session import Session
+    from contactfpga.tools.recordings.recorder import Session, Split
 
     flags.check_forces(args)
     body = _body(args)
@@ -85,7 +84,7 @@ def _body(args: argparse.Namespace) -> Body | None:
 
 
 def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
-    from contactfpga.tools.recordings.link_recorder import Mount
+    from contactfpga.tools.recordings.messages import Mount
 
     if body is None:
 
@@ -166,7 +165,7 @@ class _Progress:
         if self._shown:
             print("\r", end="\033[K", file=sys.stderr, flush=True)
         session = self._session
-        if session.links:
+        if session.files:
             answer = {
                 "files": session.files,
                 "duration_s": session.seconds,

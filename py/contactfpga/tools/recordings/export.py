@@ -22,7 +22,7 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 
 COLUMNS = {
-    "t_s": (np.float64, "seconds since the recording began, on the host's clock"),
+    "t_s": (np.float64, "seconds since the recording began, on the host's clock; without arrivals on the board's"),
     "link": (np.str_, "whose board it is"),
     "frame": (np.int64, "frames of this link before this one"),
     "time_us": (np.int64, "when the frame was scanned, in us since its board's power-up"),
@@ -111,24 +111,20 @@ def export(recording: Recording, path: str | Path) -> int:
     write = _WRITERS.get(target.suffix.lower())
     if write is None:
         raise ContactFPGAError(f"{path}: its name ends in {target.suffix!r}; take one of: {', '.join(_WRITERS)}")
-    counted = _PieceCounter(pieces(recording))
+    rows = 0
+
+    def counted() -> Iterator[Piece]:
+        nonlocal rows
+        for piece in pieces(recording):
+            rows += len(piece["t_s"])
+            yield piece
+
     try:
         with replaced(target) as new:
-            write(new, counted, facts(recording))
+            write(new, counted(), facts(recording))
     except OSError as error:
         raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
-    return counted.rows
-
-
-class _PieceCounter:
-    def __init__(self, parts: Iterable[Piece]):
-        self._parts = parts
-        self.rows = 0
-
-    def __iter__(self) -> Iterator[Piece]:
-        for piece in self._parts:
-            self.rows += len(piece["t_s"])
-            yield piece
+    return rows
 
 
 def _parquet(path: Path, parts: Iterable[Piece], about: str) -> None:

@@ -177,8 +177,10 @@ class McapFile:
 
     def flush(self) -> None:
         self._waiting, self._since_s = 0, math.inf
-        self._guarded(self._writer.flush)
-        self._file.holds_messages = self.messages > 0
+        if not self._failed:
+            self._failed = True  # until it is written
+            self._writer.flush()
+            self._failed, self._file.holds_messages = False, self.messages > 0
 
     def close(self) -> None:
         """Write buffered messages and the index; may be called twice."""
@@ -190,15 +192,6 @@ class McapFile:
                 self._file.flush()
         finally:
             self._file.close()
-
-    def _guarded(self, write) -> None:  # type: ignore[no-untyped-def]
-        if self._failed:
-            return
-        try:
-            write()
-        except RecordingFailed:
-            self._failed = True
-            raise
 
     def _schema(self, name: str, encoding: str, text: bytes) -> int:
         key = (name, encoding, text)

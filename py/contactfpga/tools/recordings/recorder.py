@@ -1,31 +1,31 @@
-"""Writes boards' data into one or successive MCAP files."""
+"""Records boards into one or successive MCAP files, with one thread per board."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
-import json
-import re
+import os
 import threading
 import time
-from collections.abc import Mapping, Set
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import TracebackType
 
+from contactfpga.driver import driver, forks
+from contactfpga.driver.address import MAX_LINKS, MAX_NAME
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap import MAX_LINKS, MAX_NAME, METADATA, numbered
+from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
-from contactfpga.inputs.values import shown
-from contactfpga.robot.ros.cdr import encode
-from contactfpga.robot.ros.convert import header
-from contactfpga.robot.ros.feed import offset_ns
-from contactfpga.robot.ros.types import PACKAGE
-from contactfpga.tools.recordings.mcap_file import McapFile
-from contactfpga.wire.hello import Cutter, Hello
+from contactfpga.inputs.values import is_finite, shown
+from contactfpga.robot.ros.feed import Felt
+from contactfpga.skin import Skin
+from contactfpga.tools.recordings.link_recorder import LinkRecorder, topic_of
+from contactfpga.tools.recordings.mcap import METADATA, SUFFIX, numbered
+from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
+from contactfpga.tools.recordings.messages import Mount
+from contactfpga.tools.recordings.recording import UNNAMED
 
 PATIENCE_S = 2.0
 """Wait of a new file for hellos at its beginning; boards send two per second."""
-BYTES = f"{PACKAGE}/Bytes"
-"""Type of the messages with a board's bytes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,190 +41,226 @@ class Split:
         return file.messages > 0 and (full or (self.seconds is not None and file.seconds >= self.seconds))
 
 
-class Recorder:
-    """The files, and the recorded links. Thread-safe."""
+class Session:
+    """Records boards into ``path``: :meth:`add` each of them, then :meth:`start`; a context manager that ends it.
 
-    def __init__(self, path: str | Path, split: Split | None = None):
-        self.path = Path(path)
+    ``split``: limits of a file; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only`` omits
+    messages, which can be made from the bytes: about a fifth of the size. ``about``: texts to store by name. Raises
+    :class:`ContactFPGAError`, also if the file exists.
+    """
+
+    file: McapFile
+
+    def __init__(
+        self,
+        path: str | Path,
+        split: Split | None = None,
+        bytes_only: bool = False,
+        *,
+        about: Mapping[str, Mapping[str, str]] | None = None,
+    ):
+        check_new(path)
+        self.links: list[LinkRecorder] = []
         self.lock = threading.RLock()
-        self._split = split
-        self._links: list[LinkFile] = []
-        self._about: list[tuple[str, Mapping[str, str]]] = []
-        self._old: McapFile | None = None
+        self._path, self._split, self._bytes_only = Path(path), split, bytes_only
+        self._about = list((about or {}).items())
+        self._paths: list[Path] = []
+        self._open: list[McapFile] = []  # the newest last; before it one of which some links still wait for a hello
         self._sizes: dict[Path, int] = {}  # of the files that are closed
-        self.files: list[Path] = []
-        """Files in order."""
-        self.file = self._begin()
+        self._stop, self._ended = threading.Event(), threading.Event()
+        self._begun: threading.Event | None = None
+        self._failure: BaseException | None = None
+        self._threads: list[threading.Thread] = []
+        forks.watch(self)
+
+    def add(
+        self,
+        port: str | SimulatedPort | None = None,
+        skin: Skin | str | Path | None = None,
+        *,
+        name: str | None = None,
+        baud: int | None = None,
+        timeout: float = 1.0,
+        mount: Mount | None = None,
+        felt: Callable[[Board], Felt | None] | None = None,
+    ) -> None:
+        """Open a board, as :func:`contactfpga.open` does.
+
+        ``name``: of its link, by default its Skin's. ``mount``: place of its sheet on a robot. ``felt``: from the open
+        board to a function for the forces at a frame's zones.
+        """
+        if self._begun is not None:
+            raise ContactFPGAError("this recording has begun; add all boards before start()")
+        link = LinkRecorder(self, mount)
+        board = driver.open(port, skin, baud=baud, record=link, timeout=timeout)
+        try:
+            link.name = board.hello.name or UNNAMED if name is None else name
+            if link.name in {one.name for one in self.links}:
+                raise ContactFPGAError(f"two links are named {link.name!r}; give their Skins different names")
+            if len(self.links) == MAX_LINKS or len(link.name) > MAX_NAME:
+                limits = f"a recording has at most {MAX_LINKS} links, with names of {MAX_NAME} characters"
+                raise ContactFPGAError(f"link {shown(link.name)} cannot be added: {limits}")
+            link.topic = topic_of(link.name, [one.topic for one in self.links])
+            link.felt = None if felt is None else felt(board)
+        except BaseException:
+            board.close()
+            raise
+        self.links.append(link)
+        self._about.append((METADATA, link.facts))
+
+    def start(self, seconds: float | None = None) -> None:
+        """Create the file, and record for ``seconds``, or until :meth:`stop`. Raises ValueError, and
+        :class:`ContactFPGAError` without a board or if started before.
+        """
+        if seconds is not None and (not is_finite(seconds) or seconds <= 0):
+            raise ValueError(f"seconds is {shown(seconds)}; it must be a positive number, or None until stop()")
+        if self._begun is not None:
+            raise ContactFPGAError("this recording was started already; make another Session")
+        if not self.links:
+            raise ContactFPGAError("there is no board to record; add() one first")
+        # In a thread of its own, as all that writes: where Ctrl-C interrupts the main thread nothing is left half made.
+        # Events are waited for, as a `join` that is interrupted forgets that its thread still runs.
+        self._begun = threading.Event()
+        threading.Thread(target=self._begin, args=(seconds, self._begun), name="recorder").start()
+        self._begun.wait()
+        if self._failure is not None:
+            raise self._failure
+
+    def _begin(self, seconds: float | None, begun: threading.Event) -> None:
+        try:
+            self._next_file()
+            for link in self.links:
+                link.begin(messages=not self._bytes_only)
+        except BaseException as error:
+            self._failure = error
+        else:
+            for link in self.links:
+                thread = threading.Thread(target=self._run, args=(link, seconds), name="recorder", daemon=True)
+                self._threads.append(thread)
+            self._left = len(self._threads)  # links that are being recorded
+            for thread in self._threads:
+                thread.start()
+        finally:
+            begun.set()
+
+    def _run(self, link: LinkRecorder, seconds: float | None) -> None:
+        try:
+            link.run(self._stop, seconds)
+        finally:
+            if isinstance(link.error, RecordingFailed):  # the others have no place to write to either
+                self._stop.set()
+            with self.lock:
+                self._left -= 1
+                if not self._left:
+                    self._ended.set()
+
+    def poll(self) -> None:
+        """Write old buffers, and begin a new file if due; links call it often."""
+        now_s = time.monotonic()
+        with self.lock:
+            for file in self._open:
+                file.flush_old(now_s)
+            if len(self._open) > 1:
+                for link in self.links if now_s - self._begun_s > PATIENCE_S else ():
+                    link.switch()
+                if all(link.file is self.file for link in self.links):
+                    self._close_file()
+            elif self._split is not None and self._split.due(self.file):
+                self._next_file()
+                for link in self.links:
+                    link.wait_for_hello()
+
+    def _next_file(self) -> None:
+        self._begun_s = time.monotonic()
+        path = self._path if self._split is None else numbered(self._path, len(self._paths) + 1)
+        self.file = McapFile(path)
+        self._paths.append(path)
+        self._open.append(self.file)
+        for name, values in self._about:
+            self.file.metadata(name, values)
+
+    def _close_file(self) -> None:
+        file = self._open.pop(0)
+        try:
+            file.close()
+        finally:
+            self._sizes[file.path] = file.size
+        if not file.messages and len(self._paths) > 1:  # begun at the very end
+            file.path.unlink(missing_ok=True)
+            self._paths.remove(file.path)
+            del self._sizes[file.path]
+
+    @property
+    def running(self) -> bool:
+        """Whether a board is still being recorded."""
+        return not self._ended.is_set()
+
+    def wait(self, seconds: float) -> None:
+        """Wait until all has ended, at most this long."""
+        self._ended.wait(seconds)
+
+    def stop(self) -> None:
+        """End all, and close the file; may be called twice. Raises the error that ended a link early."""
+        self._stop.set()
+        if self._begun is not None:
+            self._begun.wait()
+        for thread in self._threads:
+            thread.join()
+        try:
+            for link in self.links if self._threads else ():
+                link.finish()
+        finally:
+            for link in self.links:
+                link.board.close()
+            with self.lock:
+                for link in self.links if self._open else ():
+                    link.switch()
+                while self._open:
+                    self._close_file()
+        for link in self.links:
+            if link.error is not None:
+                raise link.error
+
+    def forked(self) -> None:
+        self._stop, self._ended, self._begun = threading.Event(), threading.Event(), None
+        self._ended.set()
+        self.links, self._threads, self._open, self.lock = [], [], [], threading.RLock()
+
+    @property
+    def files(self) -> list[Path]:
+        """Its files in order; empty before it has begun."""
+        return self._paths if self._threads else []
+
+    @property
+    def seconds(self) -> float:
+        """Recorded time."""
+        return max((link.seconds for link in self.links), default=0.0)
+
+    @property
+    def frames(self) -> int:
+        """Frames read."""
+        return sum(link.frames for link in self.links)
 
     @property
     def size(self) -> int:
-        """Bytes in all files."""
+        """Bytes in its files."""
         with self.lock:
-            files = [file for file in (self._old, self.file) if file is not None and file.path in self.files]
-            return sum(self._sizes.values()) + sum(file.size for file in files if file.path not in self._sizes)
+            return sum(self._sizes.values()) + sum(file.size for file in self._open)
 
-    def add(self, name: str, board: Board) -> LinkFile:
-        """Add a link by name; its board is open."""
-        with self.lock:
-            if name in {link.name for link in self._links}:
-                raise ContactFPGAError(f"two links are named {name!r}; give their Skins different names")
-            if len(self._links) == MAX_LINKS or len(name) > MAX_NAME:
-                limits = f"a recording has at most {MAX_LINKS} links, with names of {MAX_NAME} characters"
-                raise ContactFPGAError(f"link {shown(name)} cannot be added: {limits}")
-            topic = topic_of(name, {link.topic for link in self._links})
-            link = LinkFile(self, name, topic, facts(name, board), _epoch_ns(board))
-            self._links.append(link)
-            self.about(METADATA, link.facts)
-            return link
+    def __enter__(self) -> Session:
+        return self
 
-    def about(self, name: str, values: Mapping[str, str]) -> None:
-        """Store texts in every file."""
-        self._about.append((name, values))
-        self.file.metadata(name, values)
-
-    def poll(self) -> None:
-        """Write old buffers, and begin a new file if due. Call it often."""
-        now_s = time.monotonic()
-        with self.lock:
-            for file in (self._old, self.file):
-                if file is not None:
-                    file.flush_old(now_s)
-            if self._old is not None:
-                self._end_old(now_s)
-            elif self._split is not None and self._split.due(self.file):
-                self._old, self.file = self.file, self._begin()
-                for name, values in self._about:
-                    self.file.metadata(name, values)
-                for link in self._links:
-                    link.wait_for_hello()
-
-    def close(self) -> None:
-        """Close the files; may be called twice."""
-        with self.lock:
-            for link in self._links:
-                link.switch()
-            for file in (self._old, self.file):
-                if file is not None:
-                    self._close(file)
-            self._old = None
-
-    def _end_old(self, now_s: float) -> None:
-        assert self._old is not None
-        if now_s - self._begun_s > PATIENCE_S:
-            for link in self._links:
-                link.switch()
-        if all(link.file is self.file for link in self._links):
-            self._close(self._old)
-            self._old = None
-
-    def _close(self, file: McapFile) -> None:
-        file.close()
-        self._sizes[file.path] = file.size
-        if not file.messages and len(self.files) > 1:  # begun at the very end
-            file.path.unlink(missing_ok=True)
-            self.files.remove(file.path)
-            del self._sizes[file.path]
-
-    def _begin(self) -> McapFile:
-        self._begun_s = time.monotonic()
-        path = self.path
-        if self._split is not None:
-            path = numbered(path, len(self.files) + 1)
-        file = McapFile(path)
-        self.files.append(path)
-        return file
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.stop()
 
 
-class LinkFile:
-    """One link's output into its current file."""
-
-    def __init__(self, recorder: Recorder, name: str, topic: str, facts: dict[str, str], epoch_ns: int):
-        self.name = name
-        self.topic = topic
-        self.facts = facts
-        self.file = recorder.file
-        self._recorder = recorder
-        self._epoch_ns = epoch_ns
-        self._cutter: Cutter | None = None
-
-    def time_ns(self, clock_s: float) -> int:
-        """Time in ns since 1970, of a moment on the board's :meth:`~contactfpga.Board.clock`."""
-        return self._epoch_ns + round(clock_s * 1e9)
-
-    def take_bytes(self, data: bytes, clock_s: float) -> None:
-        """Add bytes that arrived by then."""
-        with self._recorder.lock:
-            before, after = (data, b"") if self._cutter is None else self._cutter.take(data)
-            self._bytes(before, clock_s)
-            if after:
-                self.switch()
-                self._bytes(after, clock_s)
-            self._recorder.poll()
-
-    def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
-        """Add a message; ``what`` ends its topic, or with a leading slash is all of it."""
-        topic = what if what.startswith("/") else f"{self.topic}/{what}"
-        link = None if what.startswith("/") else self.name
-        with self._recorder.lock:
-            self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
-
-    def poll(self) -> None:
-        """Write buffers while nothing arrives."""
-        self._recorder.poll()
-
-    def wait_for_hello(self) -> None:
-        """Continue in the recorder's newest file with the next hello."""
-        self._cutter = Cutter()
-
-    def switch(self) -> None:
-        """Continue in the newest file now."""
-        cutter, self._cutter = self._cutter, None
-        if cutter is not None and cutter.held:
-            self._bytes(cutter.held, self._last_s)
-        self.file = self._recorder.file
-
-    def _bytes(self, data: bytes, clock_s: float) -> None:
-        self._last_s = clock_s
-        if data:
-            time_ns = self.time_ns(clock_s)
-            self.write("bytes", BYTES, of_bytes(data, time_ns, self.name), clock_s)
-
-
-def topic_of(link: str, taken: Set[str] = frozenset()) -> str:
-    """Topic of a link's messages, with underscores for characters that ROS does not allow, and with a number at its end
-    if the topic is ``taken`` by another link.
-    """
-    name = re.sub(r"\W", "_", link, flags=re.ASCII)
-    topic = f"/{name}" if name and not name[0].isdigit() else f"/_{name}"
-    numbered = (f"{topic}_{number}" for number in itertools.count(2))
-    return next(one for one in itertools.chain([topic], numbered) if one not in taken)
-
-
-def facts(name: str, board: Board) -> dict[str, str]:
-    """Metadata for readers before the first byte."""
-    hello = board.hello
-    try:
-        skin = board.skin.to_toml()
-    except ContactFPGAError:
-        skin = ""
-    return {
-        "link": name,
-        "port": board.port,
-        "fingerprint": hello.fingerprint.hex(),
-        "sheet": json.dumps(dataclasses.asdict(hello.sheet)),
-        "skin": skin,
-    }
-
-
-def link_name(hello: Hello) -> str:
-    """Default name of a board."""
-    return hello.name or "skin"
-
-
-def _epoch_ns(board: Board) -> int:
-    return offset_ns(time.time_ns, board.clock)
-
-
-def of_bytes(data: bytes, time_ns: int, frame: str) -> bytes:
-    """A message of bytes of which the last arrived then."""
-    return encode(BYTES, {"header": header(time_ns, frame), "data": data})
+def check_new(path: str | Path) -> None:
+    """Raises :class:`ContactFPGAError` for an invalid name of a new recording."""
+    if Path(path).suffix != SUFFIX:
+        raise ContactFPGAError(f"{path} does not end in {SUFFIX}, by which programs know such files; name it so")
+    if os.path.lexists(path):
+        raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")
+    if not Path(path).parent.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: there is no folder {Path(path).parent}")

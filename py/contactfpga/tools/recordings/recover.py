@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver.mcap import (
+from contactfpga.inputs.files import replaced, told
+from contactfpga.tools.recordings.mcap import (
     LARGEST,
     MAGIC,
     Cut,
@@ -24,11 +25,10 @@ from contactfpga.driver.mcap import (
     Unpacker,
     Unreadable,
     file_bytes,
+    opened,
     parsed,
     records,
 )
-from contactfpga.errors import MissingExtra
-from contactfpga.inputs.files import open_regular, replaced, told
 from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
 
 
@@ -63,17 +63,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
     """
     source = Path(path)
     target = source.parent / f"{source.stem}_recovered{source.suffix}" if into is None else Path(into)
-    try:
-        file = open_regular(source)
-    except OSError as error:
-        raise RecordingError(f"{source} cannot be opened: {error.strerror or told(error)}") from None
-    try:
-        import mcap.records  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise MissingExtra(f"recovering a recording ({error})", "record") from None
-    with file:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise RecordingError(f"{source} is no MCAP file")
+    with opened(source) as file:
         if os.path.lexists(target):
             raise RecordingError(f"{target} is there already; name a new file, or remove it first")
         found = RecoveryReport(target)

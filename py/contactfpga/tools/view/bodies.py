@@ -33,7 +33,7 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     import viser
 
-    from contactfpga.tools.recordings import Recording
+    from contactfpga.tools.recordings.recording import Recording
 
 STEP_S = 0.04
 TOLD_S = 0.25

@@ -28,7 +28,7 @@ from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.pushing import SimulatedView
-from contactfpga.tools.view.replayed import LinkRecording, Reading, is_recording, load, silent
+from contactfpga.tools.view.replayed import Reading, is_recording, load, silent
 from contactfpga.tools.view.server import Guard
 from contactfpga.tools.view.simulated import SimulatedSource
 from contactfpga.tools.view.sources import BoardSource, Moment, Source
@@ -161,8 +161,8 @@ def _source(named: ViewRequest) -> tuple[Source | BodySource | BodyPlayer | Simu
     if names_robot(named.port):
         return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):
-        recorded = load(named.port, named.link, named.timeout, named.reading)
-        if isinstance(recorded, LinkRecording) and not recorded.named and holds_robot(recorded.recording):
+        recorded = load(named.port, named.link, named.reading)
+        if not recorded.named and holds_robot(recorded.recording):
             return BodyPlayer(recorded.recording), None
         return Player(recorded), None
     if named.port is not None and (not _is_virtual(named.port) or SheetOf.parse(named.port) is not None):

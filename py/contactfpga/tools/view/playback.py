@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
+from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import Stats
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.tools.view.replayed import BoardRecording
@@ -33,7 +34,7 @@ class Playback(abc.ABC, Generic[Item]):
         self.position_s = 0.0
         self.playing = True
         self.speed = 1.0
-        self._clock = clock
+        self._clock, self._pace = clock, Pace(clock=clock)
         self._lock = threading.Lock()
         self._items: Iterator[tuple[float, Item]] = iter(())
         self._next: tuple[float, Item] | None = None
@@ -68,22 +69,27 @@ class Playback(abc.ABC, Generic[Item]):
         left = STEP_S - (self._clock() - self._stepped_s)
         if left > 0:
             time.sleep(left)
-        now = self._clock()
-        passed, self._stepped_s = now - self._stepped_s, now
+        self._stepped_s = self._clock()
         with self._lock:
+            self._pace.factor = self.speed if self.playing else 0.0
+            due_s = self._pace.due(self.position_s)
             led_to, self._led_to = self._led_to, None
             if led_to is not None:
-                self.position_s = led_to
+                self._go_to(led_to)
                 self._items = self.begin(max(0.0, led_to - BEFORE_S))
                 self._next = next(self._items, None)
-            elif self.playing:
-                self.position_s = min(self.duration_s, self.position_s + passed * self.speed)
+            else:
+                self.position_s = min(self.duration_s, self.position_s + due_s)
             until_s = self.position_s
-        self._take(until_s, now + 5 * STEP_S)
+        self._take(until_s, self._stepped_s + 5 * STEP_S)
         if self._next is None:
             self.playing = False
         elif self._next[0] <= until_s:  # slower than asked: it goes on from where it is
-            self.position_s = self._next[0]
+            self._go_to(self._next[0])
+
+    def _go_to(self, seconds: float) -> None:
+        self.position_s = seconds
+        self._pace.restart(seconds)
 
     def _take(self, until_s: float, deadline: float) -> None:
         while self._next is not None and self._next[0] <= until_s:

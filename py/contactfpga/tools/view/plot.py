@@ -34,7 +34,7 @@ def draw(recording: BoardRecording, path: Path) -> Path:
         over_time = figure.add_subplot(grid[2, :])
         _rows(figure, over_time, touches)
         _zones(figure.add_subplot(grid[0, 1], sharex=over_time), touches)
-        _losses(figure.add_subplot(grid[1, 1], sharex=over_time), touches, recording)
+        _losses(figure.add_subplot(grid[1, 1], sharex=over_time), touches, recording.timed)
         return style.save(figure, path)
 
 
@@ -85,18 +85,18 @@ def _rows(figure: Figure, axes: Axes, touches: Touches) -> None:
     axes.set_title("Pressed cells of each row" if cells else "Rows in which barycenters were", loc="left")
 
 
-def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
-    late = np.array(list(recording.lateness()))
+def _losses(axes: Axes, touches: Touches, timed: bool) -> None:
     axes.stairs(np.cumsum(touches.lost), touches.seconds, color=style.VERMILLION)
     axes.set(xlabel="time, s", ylabel="frames lost", ylim=(0, max(1, touches.lost.sum()) * 1.15))
     axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
     axes.yaxis.label.set_color(style.VERMILLION)
-    if not len(late):
+    if not timed or not touches.late:
         axes.set_title("Frames lost, in all; the file has no delays", loc="left")
         return
     other = axes.twinx()
     other.spines["right"].set_visible(True)
-    other.plot(late[:, 0], late[:, 1] * 1e3, ".", markersize=2, color=style.BLUE)
+    seconds, late_s = np.array(touches.late).T
+    other.plot(seconds, (late_s - late_s.min()) * 1e3, ".", markersize=2, color=style.BLUE)
     other.set(ylim=(0, None))
     other.set_ylabel("delay over the least, ms", color=style.BLUE)
     axes.set_title("Frames lost, in all; delay of each frame", loc="left")
@@ -123,6 +123,8 @@ class Touches:
         self.touched_s = np.zeros((sheet.rows, sheet.columns))
         """Time of a barycenter in each cell; with ``report = "cells"``, time for which each cell was pressed."""
         self.lost = np.zeros(steps, int)
+        self.late: list[tuple[float, float]] = []
+        """Time of a frame of each piece of bytes, and by how much the host's clock is then ahead of the board's."""
         self._before: Zones | None = None
         self._before_s = 0.0
 
@@ -147,6 +149,11 @@ class Touches:
         if self._before is not None:
             self._hold(self._before, self._before_s, times_s[0])
             self.lost[steps[0]] += (int(sequences[0]) - self._before.sequence - 1) % 256
+        # Only the last of several frames with one time has it exactly, as times are never below 0 and never fall.
+        known = np.flatnonzero(np.diff(times_s) > 0)
+        late_s = times_s[known] - batch.frames["time_us"][known] / 1e6
+        changed = np.abs(np.diff(late_s, prepend=self.late[-1][1] if self.late else np.inf)) > 1e-9
+        self.late += zip(times_s[known][changed], late_s[changed], strict=True)
         np.add.at(self.lost, steps[1:], (np.diff(sequences) - 1) % 256)
         self.frames += len(chunk)
         np.maximum.at(self.zones, steps, batch.frames["total_zones"])

@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.driver.pace import Pace
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shortened, shown
 from contactfpga.robot.body import Body, LinkState, Snapshot
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.tools.view import model_file, obstacle, solids
 from contactfpga.tools.view.fingers import Finger
-from contactfpga.tools.view.sources import SimulatedPace
+from contactfpga.tools.view.sources import MAX_LAG_S
 
 REFLEX_S = 1e-3
 NO_REFLEX = "none"
@@ -157,7 +158,7 @@ class SimulatedSource:
         self.links = {name: SharedLink() for name in self.body.links}
         self.obstacle = obstacle.Obstacle()
         self.simulated_s = 0.0
-        self.pace = SimulatedPace(self.simulated_s)
+        self.pace = Pace(self.simulated_s, most_lag_s=MAX_LAG_S)
         self._restart()
 
     def restart(self) -> None:

@@ -6,7 +6,7 @@ import collections
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -25,45 +25,6 @@ from contactfpga.zones.zone import Zone, Zones
 
 MAX_LAG_S = 0.1
 """Largest lag of a board that is caught up; beyond it, time slips."""
-
-MOMENT_S = 0.04
-LEAST_S = 0.0005
-SMOOTHING = 0.2
-
-WINDOW_S = 2.0
-
-
-class SimulatedPace(Pace):
-    """A board's real time, or slower on a slow machine, whose speed it measures."""
-
-    def __init__(self, simulated_s: float, clock: Callable[[], float] = time.monotonic):
-        super().__init__(simulated_s, most_lag_s=MAX_LAG_S, clock=clock)
-        self._speed = 1.0
-        self._seen: collections.deque[tuple[float, float]] = collections.deque([(clock(), simulated_s)])
-
-    def due(self, at_s: float) -> float:
-        now = self._clock()
-        self._seen.append((now, at_s))
-        while now - self._seen[0][0] > WINDOW_S:
-            self._seen.popleft()
-        return super().due(at_s)
-
-    def ran(self, simulated_s: float, seconds: float) -> None:
-        """Report the computing time of a simulated duration."""
-        if seconds > 0:
-            self._speed += SMOOTHING * (simulated_s / seconds - self._speed)
-
-    @property
-    def most_s(self) -> float:
-        """Seconds that this machine simulates within :data:`MOMENT_S`: slow machines show shorter moments."""
-        return max(MOMENT_S * self._speed, LEAST_S)
-
-    @property
-    def share(self) -> float:
-        """Share of real time over the last seconds; 1: it keeps up."""
-        (first, began), (last, ended) = self._seen[0], self._seen[-1]
-        return min(1.0, (ended - began) / (last - first)) if last - first > 0.2 else 1.0
-
 
 STEP_S = 0.02
 
@@ -129,7 +90,7 @@ class BoardSource:
         self.meter = Meter()
         self._board, self._virtual = board, virtual
         self._frames = board.subscribe(WAITING)
-        self._pace = SimulatedPace(board.clock()) if simulated or virtual is not None else None
+        self._pace = Pace(board.clock(), most_lag_s=MAX_LAG_S) if simulated or virtual is not None else None
         # One frame in many is followed, so a contact may be gone from view for longer than from the board's.
         self._tracker = Tracker(gate_mm=40.0, hold_ms=60.0)
 

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import covers
+from contactfpga_sim.apps import covers
+from contactfpga_sim.apps.stats import wilson
 from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
-from contactfpga_sim.lab.flips.campaign import wilson
 
 TOUCHES = 120
 
@@ -72,8 +72,6 @@ _CHANGES = (
     {"face": "caps"},
     {"face": "tiles"},
     {"pitch_mm": 6.4},
-    {"pitch_mm": 10.0},
-    {"threshold_n": 1.0},
     {"threshold_n": 0.4},
     {"threshold_n": 0.2},
     {"foam_mm": 2.0},
@@ -81,11 +79,8 @@ _CHANGES = (
 )
 
 
-def _around(base: Geometry) -> list[Geometry]:
-    return list(dict.fromkeys([base, *(base._replace(**change) for change in _CHANGES)]))
-
-
-GEOMETRIES = tuple(dict.fromkeys([*_around(PAPER), *_around(BEST)]))
+GEOMETRIES = (PAPER, *(PAPER._replace(**change) for change in _CHANGES), BEST, BEST._replace(foam_mm=2.0))
+"""The paper's sheet and each change to it, the best sheet, and the kits'."""
 
 WAYS = ("6 ms", "UART", "pin", "limit alone")
 
@@ -236,14 +231,6 @@ def effects(found: Mapping[Geometry, Found], base: Geometry) -> list[Effect]:
 
 def _shown(value: str | float) -> str:
     return value if isinstance(value, str) else f"{value:g}"
-
-
-def effect_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
-    told = [["from", "what changes", "in place of", "now", "mean peak force, N"]]
-    for name, base in (("the paper's sheet", PAPER), ("tiles", BEST)):
-        for one in sorted(effects(found, base), key=lambda effect: effect.newtons):
-            told.append([name, one.factor, one.before, one.after, f"{one.newtons:+.1f}"])
-    return told
 
 
 def matters(found: Mapping[Geometry, Found]) -> str:

@@ -6,6 +6,7 @@ import math
 
 from contactfpga.design.cover import Ball, Switch, elastic
 from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
+from contactfpga_sim.apps.latency.usb import HOST_S
 
 BEHAVIORS = ("reverse", "comply")
 
@@ -196,7 +197,7 @@ class Usb(_Checked):
     timer_s: float = 1e-3
     """Latency timer: 1 ms by the driver; operating systems default to 16 ms."""
     frame_s: float = 125e-6
-    host_s: float = 0.1e-3
+    host_s: float = HOST_S
     """Time through the host's program to the controller."""
     _zero = ("timer_s", "host_s")
 

@@ -1,4 +1,4 @@
-"""The paper's Figs. 6 and 7 of a run, and charts of force and thickness over latency."""
+"""The paper's Figs. 6 and 7 of a run, and a chart of force over latency."""
 
 from __future__ import annotations
 
@@ -68,7 +68,6 @@ def _mark(place: Any, result: RunRecord, field: str, color: str) -> None:
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))
 SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
-THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
 INSTANTS = 8
 """Touches of the gateware's runs, a controller period apart."""
 COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
@@ -82,11 +81,10 @@ class Plan:
     force: tuple[SweepTask, ...]
     sheet: dict[str, tuple[SweepTask, ...]]
     speed: dict[str, tuple[SweepTask, ...]]
-    thick: dict[float, tuple[SweepTask, ...]]
 
     @property
     def all(self) -> list[SweepTask]:
-        groups = [self.force, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
+        groups = [self.force, *self.sheet.values(), *self.speed.values()]
         return [task for group in groups for task in group]
 
 
@@ -96,7 +94,7 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
     leads = [case.run.lead_s + number * case.control.period_s for number in range(INSTANTS)]
 
     def moving(speed: float) -> Case:
-        # Its base is far below: how flat a foam is pressed is the third chart's question.
+        # Its base is far below: the force of the foam alone is the question.
         return alone.but(link={"speed_m_s": speed}, foam={"base_n_m": 1e-3})
 
     return Plan(
@@ -105,10 +103,6 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
         speed={
             name: tuple(SweepTask(moving(speed), latency_s=latency) for speed in speeds)
             for name, latency in by_speed.items()
-        },
-        thick={
-            speed: tuple(SweepTask(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
-            for speed in THICK_SPEEDS_M_S
         },
     )
 
@@ -127,7 +121,6 @@ def draw(
     with matplotlib.rc_context(style.SETTINGS):
         figures = {
             "arm-force": _force(case, tasks, found),
-            "arm-thickness": _thickness(case, tasks, found),
         }
         return [style.save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
 
@@ -180,17 +173,6 @@ def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figur
     return figure
 
 
-def _thickness(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figure:
-    figure, place = _axes("from the switch to the controller, ms", "thinnest foam that is not pressed flat, mm")
-    for color, (speed, group) in zip((style.SKY, style.BLACK, style.ORANGE), tasks.thick.items()):
-        thick = [1e3 * found[task].thickness_m for task in group]
-        place.plot([1e3 * task.latency_s for task in group], thick, "o-", ms=4, color=color, label=f"{speed:g} m/s")
-    place.plot(1e3 * PAPER_S, 1e3 * case.foam.thickness_m, "*", color=style.INK, ms=10, label="paper: 6 ms, 5 mm")
-    _latencies(place, case)
-    figure.legend(loc="outside lower center", ncols=4)
-    return figure
-
-
 def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
     """Write a line per run, in SI units."""
     names = [field.name for field in dataclasses.fields(SweepPoint)]
@@ -199,6 +181,5 @@ def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
         table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])
         for task, point in found.items():
             given = (task.latency_s, task.case.link.speed_m_s, task.case.control.torque_limit_nm)
-            values = [f"{value:.6g}" for value in (*given, *dataclasses.astuple(point))]
-            table.writerow([task.way if not task.thickness else "thinnest", *values])
+            table.writerow([task.way, *(f"{value:.6g}" for value in (*given, *dataclasses.astuple(point)))])
     return path

@@ -14,7 +14,7 @@ import numpy as np
 
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm.case import STEPS_A_TIME_CONSTANT, Case, CaseError
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover.point import force_n
 from contactfpga.skin import Skin
 from contactfpga.skin.latency import AROUND_S, latency_s
-from contactfpga_sim.lab import kept
+from contactfpga_sim.apps import kept
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.report import UNLIMITED
 from contactfpga_sim.lab.arm.run import run
@@ -25,19 +24,14 @@ STEP_S = 25e-6
 ENDS_S, ENDS_M = 60e-3, 4e-3
 """An arm has retreated after this time plus the time for this distance."""
 
-RESOLUTION_M = 0.02e-3
-
-THINNEST_M, THICKEST_M = 0.05e-3, 40e-3
-
 
 @dataclasses.dataclass(frozen=True)
 class SweepTask:
-    """A run, or with ``thickness`` the search for the thinnest foam that is not pressed flat."""
+    """A run."""
 
     case: Case
     way: str = "latency"
     latency_s: float = 0.0
-    thickness: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,13 +44,12 @@ class SweepPoint:
     closes_s: float
     takes_s: float
     """Time from the switch to the controller's input."""
-    thickness_m: float = math.nan
 
 
 def work(task: SweepTask) -> dict[str, float]:
     """Fields of the task's :class:`SweepPoint`, cached by code."""
     key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
-    return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
+    return kept.kept("arm", key, lambda: dataclasses.asdict(_point(task)))
 
 
 def sweep(
@@ -93,25 +86,6 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _thinnest(task: SweepTask) -> SweepPoint:
-    def at(thickness_m: float) -> tuple[SweepPoint, bool]:
-        point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))
-        return point, point.peak_indentation_m <= thickness_m
-
-    low = high = THINNEST_M
-    point, holds = at(high)
-    while not holds:
-        low, high = high, 2 * high
-        if high > THICKEST_M:
-            return dataclasses.replace(point, thickness_m=math.nan)
-        point, holds = at(high)
-    while high - low > RESOLUTION_M:
-        middle = (low + high) / 2
-        found, holds = at(middle)
-        low, high, point = (low, middle, found) if holds else (middle, high, point)
-    return dataclasses.replace(point, thickness_m=high)
-
-
 def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
     """Longest time in s from a switch to the controller's input by each way, for one zone."""
     usb = case.usb
@@ -125,10 +99,6 @@ def unlimited(case: Case) -> Case:
     return case.but(control=UNLIMITED)
 
 
-def closing_n(case: Case) -> float:
-    return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
-
-
 def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
     """Highest speed up to which no force exceeds the limit, interpolated; NaN if the slowest exceeds or the fastest
     is safe."""
@@ -139,9 +109,3 @@ def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
     at = int(above[0])
     share = (limit_n - worst[at - 1]) / (worst[at] - worst[at - 1])
     return float(speeds[at - 1] + share * (speeds[at] - speeds[at - 1]))
-
-
-def naive_speed(case: Case, limit_n: float, latency: float) -> float:
-    """(delta(limit) - delta(closing)) / latency; unsafe, as the arm presses on after the reaction."""
-    depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
-    return max(0.0, depth[0] - depth[1]) / latency

@@ -7,18 +7,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactfpga_sim.apps.pool import executor, progress
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import anywhere, comply, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord, run
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 from contactfpga_sim.lab.arm.world import Faults
-from contactfpga_sim.lab.pool import executor, progress
 
-STEPS_US = (25.0, 12.5, 6.25)
-"""Integrator steps, each half of the one before."""
+PLACES = (
+    anywhere.PAPER,
+    *(anywhere.PAPER._replace(face=face) for face in ("buttons", "tiles")),
+    anywhere.BEST,
+)
+"""Geometries that the page shows."""
 
-STEPPED = ("closes_s", "torque_before_nm", "peak_force_n", "rest_s")
+SET = ("reacts", "speed stays", "contact force at the reaction", "peak force")
+"""Rows of the set that the page shows."""
 
 LIMITS_N = (10.0, 15.0, 20.0, 30.0)
 
@@ -47,7 +52,6 @@ def draw(folder: Path, found: ArmRuns) -> list[Path]:
 class Failure(NamedTuple):
     name: str
     changes: dict[str, Any]
-    way: str = "uart"
     faults: Faults = Faults()
 
 
@@ -56,17 +60,11 @@ BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 FAILURES = (
     Failure("nothing wrong", {}),
     Failure("halfway between four switches", {"touch": (HALFWAY,)}),
-    Failure("that, 0.1 m from the joint", {"touch": (HALFWAY | {"lever_m": 0.1},)}),
-    Failure("two contacts, one on a switch, one halfway", {"touch": ({}, {"x_mm": 25.0, "y_mm": 25.0})}),
     Failure("the patch's pressure, not a point force", {"model": "hertz"}),
-    Failure("0.6 m/s: pressed flat", {"link": {"speed_m_s": 0.6}}),
-    Failure("0.6 m/s, torque limit alone", {"link": {"speed_m_s": 0.6}}, "torque"),
     Failure("bounce of 8 ms, nobody waits", {"switch": BOUNCING, "control": {"clear_s": 0.0}}),
     Failure("bounce of 8 ms, 2 ms without contact", {"switch": BOUNCING, "control": {"clear_s": 2e-3}}),
-    Failure("noise for 4 ms from the closing on", {}, faults=Faults(noise_s=(4.68e-3, 8.68e-3))),
     Failure("board dies before the contact", {}, faults=Faults(board_dies_s=4e-3)),
     Failure("board dies in the contact", {}, faults=Faults(board_dies_s=8e-3)),
-    Failure("that, by pin", {}, "pin", Faults(board_dies_s=8e-3)),
     Failure("host dies in the contact", {}, faults=Faults(host_dies_s=8e-3)),
 )
 
@@ -75,28 +73,25 @@ def matters_text(found: ArmRuns) -> str:
     return anywhere.matters(found.anywhere)
 
 
-def places_table(found: ArmRuns) -> str:
-    return writer.table_of(anywhere.geometry_lines(found.anywhere))
+def places_table(found: ArmRuns) -> writer.Table:
+    head, *rows = anywhere.geometry_lines(found.anywhere)
+    shown = [row for geometry, row in zip(found.anywhere, rows, strict=True) if geometry in PLACES]
+    columns = [name for name in head if not name.startswith(("limit alone", "pressed in"))]
+    return writer.Table(head, rows, lambda row: row in shown, columns)
 
 
-def effects_table(found: ArmRuns) -> str:
-    return writer.table_of(anywhere.effect_lines(found.anywhere))
-
-
-def set_table(found: ArmRuns) -> str:
+def set_table(found: ArmRuns) -> writer.Table:
     """The output of ``contactfpga study arm``."""
-    return writer.table_of(report.table(found.columns, True))
+    head, *rows = report.table(found.columns, True)
+    return writer.Table(head, rows, lambda row: row[0].startswith(SET), ("", "paper", "set", *list(found.columns)[:4]))
 
 
 def failure_table() -> str:
-    lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
+    lines = [["", "reacts, ms", "because of", "peak force, N", "reversals"]]
     for failure in FAILURES:
-        found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome
-        reacts, rest = (f"{1e3 * at:.2f}" if at is not None else "never" for at in (found.reacts_s, found.rest_s))
-        flat = " (flat)" if found.bottomed else ""
-        deep = f"{1e3 * found.peak_indentation_m:.2f}{flat}"
-        numbers = [f"{found.peak_force_n:.1f}", deep, str(found.reversals), rest]
-        lines.append([failure.name, failure.way, reacts, found.reason, *numbers])
+        found = run(Case.load("paper").but(**failure.changes), "uart", faults=failure.faults).outcome
+        reacts = "never" if found.reacts_s is None else f"{1e3 * found.reacts_s:.2f}"
+        lines.append([failure.name, reacts, found.reason, f"{found.peak_force_n:.1f}", str(found.reversals)])
     return writer.table_of(lines)
 
 
@@ -107,20 +102,6 @@ def push_table() -> str:
 
 def defense_table() -> str:
     return writer.table_of(report.defense_lines(Case.load("paper")))
-
-
-def step_table() -> str:
-    lines = [["step, us", "way", "closes, ms", "torque before, Nm", "peak force, N", "at rest, ms", "largest change"]]
-    for way in ("latency", "uart"):
-        before: list[float] | None = None
-        for step in STEPS_US:
-            found = run(Case.load("paper").but(run={"step_s": 1e-6 * step}), way).outcome
-            values = [getattr(found, row.field) for row in report.ROWS]
-            change = "" if before is None else f"{100 * max(abs(a / b - 1) for a, b in zip(before, values)):.2f} %"
-            shown = [f"{row.scale * value:.4g}" for row, value in zip(report.ROWS, values) if row.field in STEPPED]
-            lines.append([f"{step:g}", way, *shown, change])
-            before = values
-    return writer.table_of(lines)
 
 
 def sheet_table(found: ArmRuns) -> str:
@@ -137,7 +118,7 @@ def sheet_table(found: ArmRuns) -> str:
 
 def speed_table(found: ArmRuns) -> str:
     """Safe speed by peak force; in brackets by force at the reaction."""
-    lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
+    lines = [["force limit, N", *found.plan.speed]]
     for limit in LIMITS_N:
         cells = []
         for group in found.plan.speed.values():
@@ -146,5 +127,5 @@ def speed_table(found: ArmRuns) -> str:
             forces = [np.array([getattr(found.points[task], field) for task in group]) for field in fields]
             safe, naive = (sweep.safe_speed(speeds, values, limit) for values in forces)
             cells.append(f"**{safe:.2f}** ({f'{naive:.2f}' if naive == naive else f'> {speeds[-1]:g}'})")
-        lines.append([f"{limit:g}", *cells, f"{sweep.naive_speed(Case.load('paper'), limit, pictures.PAPER_S):.2f}"])
+        lines.append([f"{limit:g}", *cells])
     return writer.table_of(lines)

@@ -15,11 +15,11 @@ from contactfpga.design.cover import Ball, Cells, Ellipse, Load, cells_of, elast
 from contactfpga.skin import Skin
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
+from contactfpga_sim.apps.latency.usb import BridgeChip
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.control import Controller, SensorReadings
 from contactfpga_sim.lab.arm.parts import Touch
 from contactfpga_sim.lab.arm.plant import Plant, finite
-from contactfpga_sim.lab.usb import BridgeChip
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3

@@ -89,6 +89,7 @@ def _errors(true: Plan, found: Pose, rms_mm: float) -> tuple[float, float, float
 
 
 POINTS = (3, 4, 6, 10)
+SHOWN = (3, 6)
 SWEEPS = (1, 2, 5, 10)
 
 
@@ -106,9 +107,9 @@ def _seconds(value: float) -> str:
     return "at once" if value < 0.0005 else f"{value:.3f}"
 
 
-def registration_table() -> str:
-    head = ("sheet", "points", "refused, %", "wrongly mirrored, %", "middle off by, mm", "turned by, degrees")
-    rows: list[tuple[str, ...]] = [(*head, "residual, mm")]
+def registration_table() -> writer.Table:
+    columns = ("sheet", "points", "refused, %", "middle off by, mm", "turned by, degrees")
+    rows, shown = [], []
     with tempfile.TemporaryDirectory() as folder:
         for name, skin in SKINS.items():
             for normals, points in itertools.product((True, False), POINTS):
@@ -120,7 +121,9 @@ def registration_table() -> str:
                 values = (found.middle_mm, found.turned_deg, found.residual_mm)
                 errors = ("" if math.isnan(value) else f"{value:.2f}" for value in values)
                 rows.append((first, str(points), *shares, *errors))
-    return writer.table_of(rows)
+                shown += [rows[-1]] if normals and points in SHOWN else []
+    head = (*columns[:3], "wrongly mirrored, %", *columns[3:], "residual, mm")
+    return writer.Table(head, rows, lambda row: row in shown, columns)
 
 
 def folds_table() -> str:

@@ -15,9 +15,10 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
-from contactfpga_sim.lab.chart import errors, times
-from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.apps import errors, kept, size, stats
+from contactfpga_sim.apps.errors import METRICS
+from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -27,7 +28,12 @@ FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 PIECE = 100
 
 TIMED = 200
-"""Placements timed as touches."""
+"""Most placements timed as touches."""
+
+BAD = 0.1
+
+NARROW = 0.15
+"""Half of the median's interval over the median at which touches are enough."""
 
 DEVICE = sizes.UP5K
 
@@ -50,9 +56,6 @@ KINDS = ("total", "labeller", "sensing")
 Found = dict[str, dict[str, list[float]]]
 """A value per scene, by kind and metric."""
 
-Look = tuple[np.ndarray, list[errors.Blob]]
-"""(R, C) bool pressed cells, and true contacts."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Point:
@@ -62,8 +65,6 @@ class Point:
     luts: int | None
     fmax_mhz: float | None
     host_us: float = 0.0
-    least_mm: Interval | None = None
-    """Lower bound of any method's mean barycenter error here."""
 
 
 def study(
@@ -79,20 +80,20 @@ def study(
     Results are cached by code. ``executor`` can be Dask's.
     """
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    parts: dict[Task, tuple[list[Future[Found]], list[Future[Raw]]]] = {
+    parts: dict[Task, tuple[Future[list[Found]], Future[list[Raw]]]] = {
         task: (
-            [executor.submit(accuracy, task, first) for first in range(0, task.count, PIECE)],
-            [executor.submit(timing, task, first) for first in range(0, min(TIMED, task.count), PIECE)],
+            executor.submit(accuracies, task),
+            executor.submit(timings, task),
         )
         for task in dict.fromkeys(tasks)
     }
     places = {skin: executor.submit(_size, skin) for skin in skins}
     names: dict[Future[Any], str] = {
-        **dict.fromkeys((piece for pieces, _ in parts.values() for piece in pieces), "placements"),
-        **dict.fromkeys((piece for _, timed in parts.values() for piece in timed), "times"),
+        **dict.fromkeys((pieces for pieces, _ in parts.values()), "placements"),
+        **dict.fromkeys((timed for _, timed in parts.values()), "times"),
         **dict.fromkeys(places.values(), "place and route"),
     }
-    owners = {future: task for task, (pieces, timed) in parts.items() for future in (*pieces, *timed)}
+    owners = {future: task for task, (pieces, timed) in parts.items() for future in (pieces, timed)}
     found = {} if so_far is None else so_far
     of = Counter(names.values())
     for future in as_completed(names):
@@ -102,9 +103,9 @@ def study(
         if task is None:
             continue
         pieces, timed = parts[task]
-        if all(piece.done() for piece in pieces) and all(piece.done() for piece in timed):
-            measured = intervals([piece.result() for piece in pieces])
-            passed = times.summed([piece.result() for piece in timed], task.skin)
+        if pieces.done() and timed.done():
+            measured = intervals(pieces.result())
+            passed = times.summed(timed.result(), task.skin)
             found[task] = Point(task, measured, passed, None, None)
     return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
 
@@ -115,9 +116,21 @@ def _sized(point: Point, size: sizes.Size) -> Point:
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     return {
-        kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
+
+
+def accuracies(task: Task) -> list[Found]:
+    """Errors of pieces of the scenes, until it is clear that more than :data:`BAD` of all are miscounted: then no more
+    digit of the share matters."""
+    found: list[Found] = []
+    for first in range(0, task.count, PIECE):
+        found.append(accuracy(task, first))
+        wrong = [value for piece in found for value in piece["total"]["miscounted"]]
+        if stats.interval(wrong).low > BAD:
+            break
+    return found
 
 
 def accuracy(task: Task, first: int) -> Found:
@@ -125,9 +138,20 @@ def accuracy(task: Task, first: int) -> Found:
 
     def new() -> Found:
         scenes = _touches(task, first)
-        return compared((look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
+        return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
+
+
+def timings(task: Task) -> list[Raw]:
+    """Times of pieces of the touches, until the interval of the median is narrow."""
+    found: list[Raw] = []
+    for first in range(0, min(TIMED, task.count), PIECE):
+        found.append(timing(task, first))
+        median = stats.quantile([value for piece in found for value in piece["touch"]], 0.5)
+        if median.high - median.low <= 2 * NARROW * median.value:
+            break
+    return found
 
 
 def timing(task: Task, first: int) -> Raw:
@@ -141,11 +165,7 @@ def _touches(task: Task, first: int) -> list[Scene]:
     return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, first=first)
 
 
-def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
-
-
-def compared(looks: Iterable[Look], skin: Skin) -> Found:
+def compared(looks: Iterable[errors.Look], skin: Skin) -> Found:
     found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
     for cells, there in looks:
         for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
@@ -193,10 +213,18 @@ def covered(task: Task) -> bool:
     return not times.at_once(task.cover)
 
 
+def in_all(points: Sequence[Point]) -> list[str]:
+    """Methods with a point in every family of these."""
+    families = {point.task.family for point in points}
+    counts = Counter(point.task.method for point in points)
+    return [method for method, count in counts.items() if count == len(families)]
+
+
 def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the least mean share of miscounted scenes; the first of equals."""
+    """The covered method with the least mean share of miscounted scenes of all families; the first of equals."""
     shares: dict[str, list[float]] = {}
+    methods = in_all(points)
     for point in points:
-        if covered(point.task):
+        if covered(point.task) and point.task.method in methods:
             shares.setdefault(point.task.method, []).append(point.errors["total"]["miscounted"].mean)
     return min(shares, key=lambda method: float(np.mean(shares[method])), default="")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.covers import COVERS, DOME, tiled
+from contactfpga_sim.apps.covers import COVERS, DOME, tiled
 
 EXTENT_MM = 160.0
 
@@ -18,7 +18,7 @@ PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
 PITCH_MM = PITCHES_MM[0]
 
 THRESHOLDS_N = (0.2, 0.6, 1.0)
-"""Closing forces besides :data:`contactfpga_sim.lab.covers.DOME`'s 0.4 N."""
+"""Closing forces besides :data:`contactfpga_sim.apps.covers.DOME`'s 0.4 N."""
 
 MOST_ZONES = 32
 """Zones per frame, enough here; more would need longer row times on the finest sheets."""
@@ -49,15 +49,19 @@ def by(labeller: Labeller) -> dict[str, Method]:
     return found
 
 
-def _methods() -> dict[str, Method]:
-    methods = by(LABELLERS["run"])
+def _covers() -> dict[str, Method]:
+    methods: dict[str, Method] = {}
     for pitch in (PITCH_MM, 10.0):
         for cover in ("caps", "paper", "bare"):
             methods |= under(cover, "run", pitch)
     for force in THRESHOLDS_N:
         switch = dataclasses.replace(DOME, force_n=force)
         methods[f"run, {PITCH_MM:g} mm, tiles, {force:g} N"] = Method(sheet(PITCH_MM), tiled(PITCH_MM, switch))
-    return methods | _settings() | _reversal()
+    return methods
+
+
+def _methods() -> dict[str, Method]:
+    return by(LABELLERS["run"]) | _covers() | _settings() | _reversal()
 
 
 def _settings() -> dict[str, Method]:
@@ -90,3 +94,6 @@ def _reversal() -> dict[str, Method]:
 
 
 METHODS: dict[str, Method] = _methods()
+
+SHEETS = by(LABELLERS["run"]) | _covers()
+"""Methods that differ in pitch, cover and closing force."""

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from contactfpga.inputs.files import replaced
+from contactfpga_sim.apps.errors import METRICS
+from contactfpga_sim.apps.stats import Interval, Quantile
 from contactfpga_sim.lab.chart.compute import KINDS, Point, Task
-from contactfpga_sim.lab.chart.errors import METRICS, Interval, Quantile
 from contactfpga_sim.lab.chart.methods import METHODS, Method
 from contactfpga_sim.lab.chart.times import Times
 
@@ -21,7 +22,7 @@ FIELDS = (
     *("family", "method", "placements", "seed"),
     *(name + end for name in (*QUANTILES, "not_felt") for end in ENDS),
     *SINGLE,
-    *(name + end for name in (*ERRORS, "least_barycenter_mm") for end in ENDS),
+    *(name + end for name in ERRORS for end in ENDS),
     "command",
 )
 
@@ -61,8 +62,7 @@ def _line(point: Point) -> dict[str, object]:
     for kind in KINDS:
         for name in METRICS:
             line |= _fields(f"{kind}_{name}", point.errors[kind][name], ".6g")
-    line |= _fields("not_felt", times.not_felt, ".6g")
-    return line | (_fields("least_barycenter_mm", point.least_mm, ".6g") if point.least_mm else {})
+    return line | _fields("not_felt", times.not_felt, ".6g")
 
 
 def _fields(name: str, found: Interval | Quantile, form: str) -> dict[str, object]:
@@ -87,8 +87,7 @@ def _point(line: dict[str, str], methods: Mapping[str, Method]) -> Point:
         lower_bound_us=float(line["lower_bound_us"]),
     )
     luts, fmax = (float(line[name]) if line[name] else None for name in ("luts", "fmax_mhz"))
-    least = Interval(*_values(line, "least_barycenter_mm")) if line["least_barycenter_mm"] else None
-    return Point(task, errors, times, None if luts is None else int(luts), fmax, float(line["host_us"]), least)
+    return Point(task, errors, times, None if luts is None else int(luts), fmax, float(line["host_us"]))
 
 
 def _values(line: dict[str, str], name: str) -> tuple[float, float, float, int]:

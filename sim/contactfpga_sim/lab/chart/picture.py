@@ -14,11 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab.chart.beside import RivalMethod, bits_us
-from contactfpga_sim.lab.chart.compute import Point, covered, front, reached_us, to_build
-from contactfpga_sim.lab.chart.errors import Interval
+from contactfpga_sim.apps.covers import COVERS
+from contactfpga_sim.lab.chart.compute import Point, covered, front, reached_us
 from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.covers import COVERS
 
 MARKERS = "sv^oDp"
 
@@ -28,7 +26,6 @@ COLORS = {
     "paper": style.VERMILLION,
     "bare": style.GRAY,
     "other covers": style.PURPLE,
-    "model": style.GREEN,
 }
 
 MISSED = 0.05
@@ -78,42 +75,37 @@ METRICS = (
 )
 
 
-def save(points: Sequence[Point], folder: Path, rivals: Sequence[RivalMethod] = ()) -> None:
+def save(points: Sequence[Point], folder: Path) -> None:
     """Write ``chart.png`` and ``chart.svg``; equal points give equal files."""
     with matplotlib.rc_context(style.SETTINGS):
-        figure = picture(points, rivals)
+        figure = picture(points)
         for suffix in ("png", "svg"):
             style.save(figure, folder / f"chart.{suffix}")
 
 
-def picture(points: Sequence[Point], rivals: Sequence[RivalMethod] = ()) -> Figure:
+def picture(points: Sequence[Point]) -> Figure:
     families = list(dict.fromkeys(point.task.family for point in points))
     figure = style.new(2.2 * len(families) + 1.3)
     panels = figure.subplots(len(families), len(METRICS), sharex=True, sharey="col", squeeze=False)
     for row, family in zip(panels, families, strict=True):
         for panel, metric in zip(row, METRICS, strict=True):
-            draw(panel, metric, family, points, rivals)
+            draw(panel, metric, family, points)
             panel.set_title(family, loc="left", fontweight="bold")
-    figure.legend(*legend(points, rivals), loc="outside lower center", ncols=4)
+    figure.legend(*legend(points), loc="outside lower center", ncols=4)
     return figure
 
 
-def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point], rivals: Sequence[RivalMethod]) -> None:
+def draw(panel: Any, metric: Metric, family: str, points: Sequence[Point]) -> None:
     _axes(panel, points, metric)
     panel.set_xlabel(ALONG)
     some = [point for point in points if point.task.family == family]
-    _walls(panel, metric, some, to_build(points))
+    _wall(panel, some)
     places = [(_along(reached_us(point)), error(point, metric.name)) for point in some]
     real = [place for point, place in zip(some, places, strict=True) if covered(point.task)]
     best = front(real)
     panel.step(*np.array([real[index] for index in best]).reshape(-1, 2).T, where="post", color=style.INK, lw=0.8)
     for point, place in zip(some, places, strict=True):
         _mark(panel, point, place, markers(points), metric)
-    for rival in rivals:
-        if rival.family == family:
-            found = rival.errors[metric.name]
-            panel.plot(_along(rival.touch_us.value), found.mean, "X", color=COLORS["model"], markersize=7, zorder=5)
-            panel.text(_along(rival.touch_us.value) * 1.1, found.mean, f"{rival.name}, model", va="center", **SMALL)
 
 
 def error(point: Point, name: str) -> float:
@@ -163,13 +155,16 @@ def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
         panel.axhline(0, color=style.SOFT, linewidth=0.8)
 
 
-def _walls(panel: Any, metric: Metric, some: Sequence[Point], method: str) -> None:
-    wall: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.4, "linestyle": style.DASHES[1], "zorder": 2}
+def bits_us(points: Sequence[Point]) -> float:
+    """Microseconds of the shortest frame's bits, at the most common baud rate."""
+    bauds = [point.task.skin.baud for point in points]
+    usual = max(dict.fromkeys(bauds), key=bauds.count)
+    return min(point.times.lower_bound_us for point in points if point.task.skin.baud == usual)
+
+
+def _wall(panel: Any, some: Sequence[Point]) -> None:
     if math.isfinite(least := bits_us(some)):
-        panel.axvline(least, **wall)
-    floor = next((point.least_mm for point in some if point.task.method == method), None)
-    if isinstance(floor, Interval) and metric.name == "barycenter_mm":
-        panel.axhline(floor.mean, **wall)
+        panel.axvline(least, color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1], zorder=2)
 
 
 def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[float, str], metric: Metric) -> None:
@@ -189,9 +184,9 @@ def _mark(panel: Any, point: Point, place: tuple[float, float], shapes: dict[flo
     )
 
 
-def legend(points: Sequence[Point], rivals: Sequence[RivalMethod]) -> tuple[list[Line2D], list[str]]:
+def legend(points: Sequence[Point]) -> tuple[list[Line2D], list[str]]:
     mark: dict[str, Any] = {"linestyle": "", "markersize": 6}
-    used = {cover_of(point.task.method) for point in points} | ({"model"} if rivals else set())
+    used = {cover_of(point.task.method) for point in points}
     pitches = {point.task.skin.pitch_x_mm for point in points}
     words = {"bare": "bare: touch at once"}
     lines = {
@@ -206,6 +201,5 @@ def legend(points: Sequence[Point], rivals: Sequence[RivalMethod]) -> tuple[list
         [], [], color=style.SOFT, marker="o", mfc=style.CARD, **mark
     )
     lines["under a cover, not beaten in both"] = Line2D([], [], color=style.INK, linewidth=0.8)
-    floor = ", least error" if any(point.least_mm for point in points) else ""
-    lines[f"wall: bits of a frame{floor}"] = Line2D([], [], color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1])
+    lines["wall: bits of a frame"] = Line2D([], [], color=style.GREEN, linewidth=1.4, linestyle=style.DASHES[1])
     return list(lines.values()), list(lines)

@@ -9,25 +9,40 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.chart import beside, front_picture, host, numbers, speed, times_picture
-from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, covered, front, reached_us, study, to_build
-from contactfpga_sim.lab.chart.errors import Interval
-from contactfpga_sim.lab.chart.methods import METHODS
+from contactfpga_sim.apps import pool, speed
+from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.chart import front_picture, host, numbers, times_picture
+from contactfpga_sim.lab.chart.compute import (
+    FAMILIES_DRAWN,
+    Point,
+    Task,
+    covered,
+    front,
+    in_all,
+    reached_us,
+    study,
+    to_build,
+)
+from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
 
 NUMBERS = Path("docs/chart/chart.csv")
 
 PLACEMENTS = 400
 
-SHEETS = (16, 32, 64)
+SIDES = (16, 32, 64)
 
 
 def compute() -> list[Point]:
+    """All methods with one family, and with the others those that differ in the sheet."""
     tasks = [
-        Task(name, *method, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for name, method in METHODS.items()
+        Task(name, *method, family, PLACEMENTS, 0)
+        for family in FAMILIES_DRAWN
+        for name, method in METHODS.items()
+        if family == front_picture.FAMILY or name in SHEETS
     ]
     with pool.executor() as executor, pool.progress() as step:
-        points = beside.bounded(study(tasks, executor, True, step), executor)
+        points = study(tasks, executor, True, step)
     numbers.write(map(host.timed, points), NUMBERS)
     return numbers.read(NUMBERS)
 
@@ -36,6 +51,10 @@ def draw(folder: Path, points: list[Point]) -> list[Path]:
     times = times_picture.save(points, folder.parent / "chart" / "times.svg")
     return [times, front_picture.save(points, folder / "front.svg")]
 
+
+COMPARED = [f"{name}, 6.4 mm, tiles" for name in ("run", "serial", "projection", "cells", "reversal")]
+COVERS = [f"run, 6.4 mm, {cover}" for cover in ("tiles", "caps", "paper")]
+"""Rows that the page shows of all methods, and of all families."""
 
 HEAD = (
     "touch of the foam to last byte, median / 95 %",
@@ -48,40 +67,40 @@ HEAD = (
 )
 
 
-def front_table(points: list[Point]) -> str:
+def front_table(points: list[Point]) -> writer.Table:
     """Methods to build, then per family the covered methods that are Pareto-optimal in time and miscounts."""
-    lines = []
+    rows = []
     method = to_build(points)
     for family in dict.fromkeys(point.task.family for point in points):
         some = [point for point in points if point.task.family == family and covered(point.task)]
         best = front([(reached_us(point), point.errors["total"]["miscounted"].mean) for point in some])
         shown = [point for point in some if point.task.method == method]
         shown += [some[index] for index in best if some[index] not in shown]
-        lines += [writer.line((family, _name(point, method), *_cells(point))) for point in shown]
-    return writer.table(("family", "method", *HEAD), lines)
+        rows += [(family, _name(point, method), *_cells(point)) for point in shown]
+    columns = ("family", HEAD[0], "miscounted", "barycenter of found")
+    return writer.Table(("family", "method", *HEAD), rows, lambda row: row[1].startswith("**"), columns)
 
 
-def methods_table(points: list[Point]) -> str:
+def methods_table(points: list[Point]) -> writer.Table:
     method = to_build(points)
     some = [point for point in points if point.task.family == front_picture.FAMILY]
-    lines = [
-        writer.line((_name(point, method), *_cells(point), f"{point.luts:,}" if point.luts else "")) for point in some
-    ]
-    return writer.table(("method", *HEAD, "LUT4"), lines)
+    rows = [(_name(point, method), *_cells(point), f"{point.luts:,}" if point.luts else "") for point in some]
+    columns = ("method", HEAD[0], "electronics alone", "miscounted", "barycenter of found", "LUT4")
+    return writer.Table(("method", *HEAD, "LUT4"), rows, lambda row: row[0] in COMPARED, columns)
 
 
-def families_table(points: list[Point]) -> str:
+def families_table(points: list[Point]) -> writer.Table:
     """Miscounts and missed contacts by family; equal methods share a line."""
     families = list(dict.fromkeys(point.task.family for point in points))
     by = {(point.task.method, point.task.family): point for point in points}
-    lines: dict[object, str] = {}
-    for method in dict.fromkeys(point.task.method for point in points):
+    rows: dict[object, tuple[str, ...]] = {}
+    for method in in_all(points):
         some = [by[method, family] for family in families]
         found = [point.errors["total"] for point in some]
         shares = [f"{_percent(one['miscounted'])}; {100 * one['missed'].mean:.1f} %" for one in found]
         alike = (some[0].task.skin.pitch_x_mm, some[0].task.cover, *shares)
-        lines.setdefault(alike, writer.line((_name(some[0], to_build(points)), *shares)))
-    return writer.table(("miscounted; missed", *families), lines.values())
+        rows.setdefault(alike, (_name(some[0], to_build(points)), *shares))
+    return writer.Table(("miscounted; missed", *families), list(rows.values()), lambda row: row[0] in COVERS)
 
 
 def _name(point: Point, build: str) -> str:
@@ -113,17 +132,19 @@ def _percent(share: Interval) -> str:
     return f"{100 * share.mean:.1f} % ({100 * share.low:.1f} to {100 * share.high:.1f})"
 
 
-def host_table() -> str:
-    head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
-    lines = []
-    for size in SHEETS:
+def host_table() -> writer.Table:
+    """The page shows the least count for which the host is faster, for each sheet."""
+    rows, shown = [], []
+    for size in SIDES:
         skin = Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
         most = min(size * size // 4, skin.derived.max_items)
         # Zones take longer the more there are, cells do not.
         even = bisect.bisect_left(range(1, most + 1), 0.0, key=lambda count: _later(skin, count)) + 1
         for count in sorted({1, 5, even - 1, even, most} & set(range(1, most + 1))):
-            lines.append(_rival_line(skin, count))
-    return writer.table(head, lines)
+            rows.append(_rival_row(skin, count))
+            shown += [rows[-1]] if count == even else []
+    head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
+    return writer.Table(head, rows, lambda row: row in shown, head[:4])
 
 
 def _later(skin: Skin, count: int) -> float:
@@ -131,14 +152,14 @@ def _later(skin: Skin, count: int) -> float:
     return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
 
 
-def _rival_line(skin: Skin, count: int) -> str:
+def _rival_row(skin: Skin, count: int) -> tuple[str, ...]:
     cells = _contacts(skin, count)
     board_us, board_bytes = _frame(skin, cells)
     cells_us, cells_bytes = _frame(skin.replace(report="cells"), cells)
     label_us = host.label_us([cells], 8)
     faster = "board" if board_us < cells_us + label_us else "host"
     times = (f"{board_us:.0f} us, {board_bytes} bytes", f"{cells_us:.0f} us, {cells_bytes} bytes", f"{label_us:.0f} us")
-    return writer.line((f"{skin.rows}x{skin.columns}", str(count), *times, faster))
+    return (f"{skin.rows}x{skin.columns}", str(count), *times, faster)
 
 
 def _contacts(skin: Skin, count: int) -> np.ndarray:

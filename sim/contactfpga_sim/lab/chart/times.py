@@ -14,8 +14,8 @@ import numpy as np
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.chart import errors, speed
-from contactfpga_sim.lab.chart.errors import Interval, Quantile
+from contactfpga_sim.apps import speed, stats
+from contactfpga_sim.apps.stats import Interval, Quantile
 from contactfpga_sim.model.scenes.scene import Scene
 
 HALVINGS = 14
@@ -89,13 +89,13 @@ def measured(scenes: Sequence[Scene], skin: Skin, cover: Cover | None, first: in
 def summed(pieces: Sequence[Raw], skin: Skin) -> Times:
     touch, electric, sizes = ([value for piece in pieces for value in piece[name]] for name in pieces[0])
     closed = [value for value in electric if not math.isnan(value)]
-    usual = errors.quantile([size for size in sizes if not math.isnan(size)], 0.5).value
+    usual = stats.quantile([size for size in sizes if not math.isnan(size)], 0.5).value
     return Times(
-        errors.quantile(touch, 0.5),
-        errors.quantile(touch, 0.95),
-        errors.quantile(closed, 0.5),
-        errors.quantile(closed, 0.95),
-        errors.interval([float(math.isinf(value)) for value in touch]),
+        stats.quantile(touch, 0.5),
+        stats.quantile(touch, 0.95),
+        stats.quantile(closed, 0.5),
+        stats.quantile(closed, 0.95),
+        stats.interval([float(math.isinf(value)) for value in touch]),
         usual,
         usual * 10 * skin.derived.bit_clocks * 1e6 / skin.clock_hz,
     )

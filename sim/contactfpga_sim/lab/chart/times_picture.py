@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
+from contactfpga_sim.apps.stats import Quantile
 from contactfpga_sim.lab.chart.compute import Point, covered
-from contactfpga_sim.lab.chart.errors import Quantile
 from contactfpga_sim.lab.chart.front_picture import FAMILY
 from contactfpga_sim.lab.chart.picture import NEVER_US, TIMES_US
 

@@ -10,7 +10,8 @@ import numpy as np
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.apps import size
+from contactfpga_sim.lab import writer
 from contactfpga_sim.model.golden import volume
 
 CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]

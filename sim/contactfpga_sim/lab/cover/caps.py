@@ -16,7 +16,8 @@ from contactfpga import picture_style as style
 from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force
 from contactfpga.design.cover.press import SHEAR
-from contactfpga_sim.lab import covers, writer
+from contactfpga_sim.apps import covers
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.cover.elements import FoamOnCaps
 
 PITCHES_MM = (10.0, 6.4)
@@ -63,10 +64,16 @@ KINDS = {
 }
 
 
-def felt_table() -> str:
+def felt_table() -> writer.Table:
     head = ["pitch", "what the foam presses", "one switch takes, least"]
     head += [f"{force:g} N switch: {what}" for force in FORCES_N for what in ("50 %", "99 %", "worst")]
-    return writer.table_of([head, *(_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS))])
+    rows = [_row(pitch, name) for pitch, name in itertools.product(PITCHES_MM, KINDS)]
+    columns = [name for name in head if not name.endswith(("least", "worst"))]
+    paper, *_, caps, tiles = KINDS
+    fine = f"{PITCHES_MM[-1]:g} mm"
+    return writer.Table(
+        head, rows, lambda row: row[1] == paper or (row[0] == fine and row[1] in (caps, tiles)), columns
+    )
 
 
 def felt_sample() -> str:

@@ -10,8 +10,6 @@ import numpy as np
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
-from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
@@ -27,6 +25,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     still,
 )
+from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
 from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import lines_of
 from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
@@ -94,7 +93,6 @@ SETTLE = Knob(
     name="settle",
     title="Columns slower than `settle_us = 5`",
     axis="capacitance of a line, pF",
-    amount=SHARE,
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
         name: Rated(functools.partial(_capacitance, skin, circuit), most=120)
@@ -154,7 +152,6 @@ DIODES = Knob(
     name="diodes",
     title="Switches without a sound diode on a sheet that should have them",
     axis="such switches under one of three fingers",
-    amount=SHARE,
     values=(0, 1, 2, 3, 4),
     runs={
         "three fingers at corners": Rated(functools.partial(bare, REFERENCE)),
@@ -217,7 +214,6 @@ GHOSTS = Knob(
     name="ghosts",
     title="Fingers on a sheet without diodes",
     axis="fingers of 2x2 cells",
-    amount=SHARE,
     values=tuple(range(1, 9)),
     runs={"zones": Rated(_scattered), "cells": Rated(_scattered_cells)},
     helps="diodes",
@@ -228,7 +224,6 @@ GHOST = Knob(
     name="ghost",
     title="Three corners fake the fourth, without diodes",
     axis="fingers at the corners of a rectangle",
-    amount=SHARE,
     values=(1, 2, 3, 4),
     runs={"zones": Rated(_corners)},
     helps="diodes",
@@ -247,7 +242,6 @@ SETTLE_REVERSAL = Knob(
     name="settle_reversal",
     title="Lines slower than `settle_us = 0.5`, by line reversal",
     axis="capacitance of a line, pF",
-    amount=SHARE,
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
         "4.7 kΩ pull-up": Rated(functools.partial(_capacitance, REVERSAL, PULLED), most=120),
@@ -260,7 +254,6 @@ PROJECT_REVERSAL = Knob(
     name="project_reversal",
     title="Pressed switches too weak to lift their row, by line reversal",
     axis="resistance of a pressed switch, kΩ",
-    amount=SHARE,
     values=(0.1, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 20),
     runs={
         "rows pulled by 10 kΩ": Rated(functools.partial(_switch, PATIENT), most=120),
@@ -298,7 +291,6 @@ BROKEN = Knob(
     name="broken",
     title="Lines that are broken under a contact of 7x7 cells",
     axis="broken lines side by side",
-    amount=SHARE,
     values=(0, 1, 2, 3),
     runs={
         "row": Rated(functools.partial(_broken, REFERENCE, "row")),
@@ -366,7 +358,6 @@ STUCK = Knob(
     name="stuck",
     title="Switches that are stuck closed, beside a finger",
     axis="how many are stuck",
-    amount=SHARE,
     values=(0, 1, 2, 3, 4, 5, 6),
     runs={
         "no mask": Rated(functools.partial(_stuck, REFERENCE)),

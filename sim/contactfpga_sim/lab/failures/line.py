@@ -11,15 +11,14 @@ import numpy as np
 
 from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
-from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
+from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 OVERSAMPLING = 16
@@ -119,8 +118,7 @@ def heard(line: Line, data: bytes, greeted: bytes = b"") -> HostDecoding:
 def _decoded(data: bytes) -> tuple[list[str], Conversation]:
     conversation = Conversation("the line")
     events = conversation.receive(data, 0.0)
-    arrived = [event.zones for event in events if isinstance(event, Arrival)]
-    return [str(_sent(zones)) for zones in arrived], conversation
+    return [str(_sent(zones)) for zones in frames_in(events)], conversation
 
 
 def _sent(zones: Zones) -> dict[str, object]:
@@ -197,7 +195,6 @@ BAUD = Knob(
     name="baud",
     title="Baud rates that differ",
     axis="difference, %",
-    amount=SHARE,
     values=tuple(np.arange(0, 8.01, 0.25).round(2).tolist()),
     runs={
         f"host {speed}, {what}": Rated(functools.partial(draws, sign), most=480)
@@ -205,8 +202,8 @@ BAUD = Knob(
         for speed, sign in (("faster", 1), ("slower", -1))
     },
     helps="a Skin is refused beyond 1.5 %; `contactfpga doctor` counts what is damaged",
+    # The middle of the stop bit, 9.5 bits after the start, slips by half a bit; a look takes 1/16 of a bit.
     closed={f"host {speed}, frames": round(100 * 0.5 / 9.5, 2) for speed in ("faster", "slower")},
-    closed_form="the middle of the stop bit, 9.5 bits after the start, slips by half a bit; a look takes 1/16 of a bit",
 )
 
 
@@ -225,13 +222,12 @@ NOISE = Knob(
     name="noise",
     title="Pulses on the line",
     axis="pulses per second",
-    amount=SHARE,
     values=(0, 100, 300, 500, 600, 700, 800, 900, 1_000, 2_000, 5_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": Rated(_noise)},
     helps="a shorter cable, a slower `baud`",
+    # Pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the byte that it
+    # makes is added; a frame comes every 96 us.
     closed={"half a bit to two bits long": float(round(-math.log(0.95) * 1000 / SCAN_MS))},
-    closed_form="pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the "
-    "byte that it makes is added; a frame comes every 96 us",
 )
 
 
@@ -252,7 +248,6 @@ CLOCK = Knob(
     name="clock",
     title="A board whose clock is fast",
     axis="its error, %",
-    amount=SHARE,
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
     runs={"board with `clock_hz` off": Rated(_clock, most=480)},
     helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
@@ -369,7 +364,6 @@ SILENCE = Knob(
     name="silence",
     title="A board without supply, clock or configuration, or a broken cable",
     axis="ms since its last byte",
-    amount=SHARE,
     values=(1, 2, 4, 6, 10, 20, 50, 100, 200, 500, 1000, 2000),
     runs={
         "`latest()`": Rated(functools.partial(_told_late, None)),
@@ -383,10 +377,9 @@ HOST = Knob(
     name="host",
     title="A host that reads every now and then",
     axis="ms between reads",
-    amount=SHARE,
     values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
     runs={"every frame of `contactfpga.open()`": Rated(_slow_host, most=120)},
     helps='`Board.latest()` where only the newest frame counts; `send = "on_change"`',
+    # The system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan.
     closed={"every frame of `contactfpga.open()`": round(TTY_BYTES / (ZONE_BYTES + 4) * SCAN_MS, 1)},
-    closed_form="the system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan",
 )

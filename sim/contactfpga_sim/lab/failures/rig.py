@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Place
+from contactfpga_sim.lab.knobs import Place
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.sheet.wiring import LineCuts
 
@@ -38,8 +38,7 @@ class Rig:
         self.scan = skin.derived.frame_clocks
 
     def frames(self) -> list[Zones]:
-        events = self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz)
-        return [event.zones for event in events if isinstance(event, Arrival)]
+        return frames_in(self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz))
 
     def __enter__(self) -> Rig:
         return self

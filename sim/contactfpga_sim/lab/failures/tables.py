@@ -1,16 +1,12 @@
-"""Tables and pictures of docs/failures.md."""
+"""Tables of docs/failures.md."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
-from contactfpga.inputs.files import write_text
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import knob_pictures
+from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.failures.catalogue import KNOBS
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
-from contactfpga_sim.lab.pool import progress
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 HEAD = (
     *("knob", "method", "holds until", "breaks at", "closed form"),
@@ -18,20 +14,26 @@ HEAD = (
 )
 
 
-def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    return writer.table(HEAD, [line for name, methods in sweeps.items() for line in rows(KNOBS[name], methods)])
+SHOWN = ("crossing", "closing", "light", "bounce", "diodes", "broken", "stuck", "silence")
+"""Knobs whose first method the page shows."""
+COLUMNS = ("knob", "breaks at", "what helps")
 
 
-def rows(knob: Knob, methods: Mapping[str, Sweep], pictured: bool = True) -> list[str]:
-    """A knob's lines, common cells in the first. ``pictured``: the page has its picture."""
-    title = f"[{knob.title}](#{knob.name})" if pictured else knob.title
+def table(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
+    lines = {name: rows(KNOBS[name], methods) for name, methods in sweeps.items()}
+    shown = [lines[name][0] for name in SHOWN]
+    return writer.Table(HEAD, [row for some in lines.values() for row in some], lambda row: row in shown, COLUMNS)
+
+
+def rows(knob: Knob, methods: Mapping[str, Sweep]) -> list[tuple[str, ...]]:
+    """A knob's rows, common cells in the first."""
     lines = []
     for number, (method, sweep) in enumerate(methods.items()):
-        first = f"{title}: {knob.axis}" if number == 0 else ""
+        first = f"{knob.title}: {knob.axis}" if number == 0 else ""
         helps = knob.helps if number == 0 else ""
         closed = knob.format.format(knob.closed[method]) if method in knob.closed else ""
         holds, breaks, *rest = _cells(knob, sweep)
-        lines.append(writer.line((first, method, holds, breaks, closed, *rest, helps)))
+        lines.append((first, method, holds, breaks, closed, *rest, helps))
     return lines
 
 
@@ -68,68 +70,24 @@ def says(knob: Knob, sweep: Sweep) -> str:
     return "; ".join(parts)
 
 
-CLOSED = ("knob", "closed form", "value")
-
-
-def closed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
-    lines = []
-    for knob in (KNOBS[name] for name in sweeps if KNOBS[name].closed):
-        values = "; ".join(sorted({knob.format.format(value) for value in knob.closed.values()}, key=len, reverse=True))
-        lines.append(writer.line((f"[{knob.title}](#{knob.name})", knob.closed_form, f"{values} ({knob.axis})")))
-    return writer.table(CLOSED, lines)
-
-
 UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
-def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> str:
+EXPLAINED = SHOWN[-4:]
+"""Knobs whose reason the page shows."""
+
+
+def unnoticed(sweeps: Mapping[str, Mapping[str, Sweep]]) -> writer.Table:
     """A row per knob with an unnoticed fault, and the reason."""
     lines = []
     for name, methods in sweeps.items():
         where = [method for method, found in methods.items() if found.silent_at is not None]
         if where:
             knob = KNOBS[name]
-            lines.append(writer.line((f"[{knob.title}](#{name})", ", ".join(where), knob.unnoticed)))
-    return writer.table(UNNOTICED, lines)
-
-
-SAID = {
-    "capacity": "No picture: the frame carries eight zones, however many there are.",
-    "project_reversal": "No picture: with and without guard lines the limit is the same.",
-    "diodes_reversal": "The picture is that of [`diodes`](#diodes).",
-    "broken_reversal": "The picture is that of [`broken`](#broken).",
-    "stuck_reversal": "The picture is that of [`stuck`](#stuck), without a mask.",
-    "host": "No picture: beyond the limit, frames are lost and counted.",
-    "silence": "No picture: the newest frame is as old as the silence is long.",
-}
-
-
-def pictures() -> str:
-    return headed(KNOBS, "failures", SAID)
-
-
-def headed(knobs: Mapping[str, Knob], folder: str, said: Mapping[str, str]) -> str:
-    """A heading per knob, and a picture from a folder of ``docs/images``, or a sentence."""
-    shown = {name: f"![{knob.title}](images/{folder}/{name}.svg)" for name, knob in knobs.items()} | dict(said)
-    return "\n".join(f"### `{name}`\n\n{what}\n" for name, what in shown.items())
+            lines.append((knob.title, ", ".join(where), knob.unnoticed))
+    titles = [KNOBS[name].title for name in EXPLAINED]
+    return writer.Table(UNNOTICED, lines, lambda row: row[0] in titles, (UNNOTICED[0], UNNOTICED[2]))
 
 
 def compute() -> dict[str, dict[str, Sweep]]:
-    """Sweep the knobs in turn."""
-    sweeps: dict[str, dict[str, Sweep]] = {}
-    runs = sum(len(knob.runs) for knob in KNOBS.values())
-    with progress() as step:
-        for name, knob in KNOBS.items():
-            knob.sweep(lambda: step("knobs and methods", runs), sweeps.setdefault(name, {}))
-    return sweeps
-
-
-def draw(folder: Path, sweeps: Mapping[str, Mapping[str, Sweep]]) -> list[Path]:
-    """Pictures in a folder of their own, without those that :data:`SAID` replaces."""
-    (folder / "failures").mkdir(exist_ok=True)
-    drawn = []
-    for name, methods in sweeps.items():
-        if name not in SAID:
-            drawn.append(folder / "failures" / f"{name}.svg")
-            write_text(drawn[-1], knob_pictures.svg(KNOBS[name], methods))
-    return drawn
+    return knobs.sweeps("contactfpga_sim.lab.failures.catalogue")

@@ -13,8 +13,6 @@ from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import kit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
-from contactfpga_sim.lab.failures.rated import SHARE, Rated
 from contactfpga_sim.lab.failures.rig import (
     REFERENCE,
     Rig,
@@ -26,6 +24,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     seen,
 )
+from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
@@ -69,7 +68,6 @@ CLOSING = Knob(
     name="closing",
     title="Two fingers of 16 mm that come close",
     axis="gap between their rims, mm",
-    amount=SHARE,
     values=tuple(np.arange(16, -0.25, -0.5).round(2).tolist()),
     runs={
         f"{connectivity}-connectivity, {pitch} mm": Rated(
@@ -81,13 +79,13 @@ CLOSING = Knob(
     | {f"starter kit, {force} N each": Rated(functools.partial(_closing_covered, force)) for force in (2, 5, 10)},
     helps="a finer pitch; 4-connectivity; a light touch",
     unnoticed="the same switches are pressed as by one contact of that shape",
+    # Wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from sqrt(2) pitches on, by
+    # 4-connectivity from one on.
     closed={
         f"{connectivity}-connectivity, {pitch} mm": round(pitch * (math.sqrt(2) if connectivity == 8 else 1), 2)
         for pitch in (10, 5)
         for connectivity in (8, 4)
     },
-    closed_form="wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from √2 "
-    "pitches on, by 4-connectivity from one on",
 )
 
 
@@ -104,7 +102,6 @@ LIGHT = Knob(
     name="light",
     title="A finger that presses lightly on the starter kit",
     axis="force, N",
-    amount=SHARE,
     values=(20, 15, 10, 8, 6, 5, 4, 3.5, 3, 2.5, 2, 1.5, 1.25, 1, 0.75, 0.5),
     runs={f"flat, {2 * radius} mm": Rated(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
     helps="switches of less force; `contactfpga cover felt` says from which force on a finger is felt",
@@ -156,7 +153,6 @@ MOVING = Knob(
     name="moving",
     title="A finger of 24 mm that moves during the scan",
     axis="pitches per raster scan",
-    amount=SHARE,
     values=(0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
         "`raster`": Rated(functools.partial(_moving, REFERENCE, None), most=480),
@@ -204,7 +200,6 @@ BOUNCE = Knob(
     name="bounce",
     title=f"A switch that bounces; debounce of {24 * DEBOUNCE_SCANS} us",
     axis="time for which it opens once more, us",
-    amount=SHARE,
     values=tuple(range(0, 193, 12)),
     runs={
         f"`{method}`": Rated(functools.partial(_bounce, BOUNCING if method == "none" else debounced(method)))
@@ -212,8 +207,8 @@ BOUNCE = Knob(
     },
     helps="longer debounce times than the switch bounces; nobody can tell a long bounce from a second touch",
     unnoticed="a switch that opens and closes once more is what a second touch is",
+    # A switch that is open for the release time counts as released.
     closed={f"`{method}`": 24.0 * DEBOUNCE_SCANS for method in ("sym_defer_pk", "asym_eager_defer_pk")},
-    closed_form="a switch that is open for the release time counts as released",
 )
 
 
@@ -262,7 +257,6 @@ WINDING = Knob(
     name="winding",
     title="An arm that winds around a finger",
     axis="quarters of a turn",
-    amount=SHARE,
     values=tuple(range(12)),
     runs={f"`{name}`": Rated(functools.partial(_winding, skin)) for name, skin in SKINS.items()},
     helps="an exact labeller: `run` or `serial`",
@@ -282,13 +276,12 @@ CROSSING = Knob(
     name="crossing",
     title="Two fingers of 24 mm, side by side at any angle",
     axis="distance of their middles, mm",
-    amount=SHARE,
     values=tuple(range(70, 24, -1)),
     runs={f"`{name}`": Rated(functools.partial(_crossing, SKINS[name])) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
     unnoticed="pressed cells that touch are one zone by definition; `projection` and `single` see shadows only",
+    # As for two fingers that close in: 24 mm and sqrt(2) pitches.
     closed={"`run`": 38.14},
-    closed_form="as for two fingers that close in: 24 mm and √2 pitches",
 )
 
 
@@ -311,7 +304,6 @@ MANY = Knob(
     name="capacity",
     title=f"More zones than `zone_capacity = {CAPACITY}`",
     axis="zones on the sheet",
-    amount=SHARE,
     values=(*range(1, 13), 16, 32, 64),
     runs={"any labeller": Rated(functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY)))},
     helps='a larger `zone_capacity`; `report = "cells"`',

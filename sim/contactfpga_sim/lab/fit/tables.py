@@ -8,13 +8,17 @@ import sys
 
 from contactfpga.tools.commands.fit import add_flags, asked
 from contactfpga.tools.console.flags import Flags
-from contactfpga_sim.lab import pool, writer
-from contactfpga_sim.lab.fit import show
-from contactfpga_sim.lab.fit.search import fit
+from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.fit import show
+from contactfpga_sim.apps.fit.search import fit
+from contactfpga_sim.lab import writer
+
+SHOWN = ("too few scenes to tell", "the answer", "runner-up")
+"""Ends of the verdicts that the page shows."""
 
 
-def section(arguments: str) -> str:
-    """Settings that Skin refuses are left out."""
+def section(arguments: str) -> writer.Table:
+    """Settings that Skin refuses are left out; the page shows the answer and what more scenes might prefer."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
@@ -24,10 +28,12 @@ def section(arguments: str) -> str:
         found = fit(task, tried, executor, step)
     head, checked = show.reported(found)[:2]
     checked[0] = checked[0].partition(":")[0]
-    tables = (show.rows(found, impossible=False), [head, checked])
+    names, *rows = show.rows(found, impossible=False)
     none = f"Skin itself refuses {len(found.impossible)} more settings."
-    return "\n\n".join((f"    {command}", *map(writer.table_of, tables), " ".join((*show.notes(found), none))))
+    after = f"{writer.table_of([head, checked])}\n\n{' '.join((*show.notes(found), none))}"
+    columns = [name for name in names if name not in ("pitch mm", "bytes")]
+    return writer.Table(names, rows, lambda row: row[-1].endswith(SHOWN), columns, f"    {command}", after)
 
 
-def fingers_section() -> str:
+def fingers_section() -> writer.Table:
     return section("examples/scenes-fingers.toml")

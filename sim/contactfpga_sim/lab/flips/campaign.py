@@ -5,9 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import itertools
-import math
-import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,18 +14,16 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import kept, size
+from contactfpga_sim.apps import kept, size
+from contactfpga_sim.apps.stats import drawn, wilson
 from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import FlipOutcome
 from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference
 
 DESIGNS: dict[str, dict[str, Any]] = {
     "run": {},
-    "run, on_change": {"send": "on_change"},
     "serial": {"labeller": "serial"},
-    "run, on_change, reversal": {"send": "on_change", "scan": "reversal", "precharge_us": 0.5},
     "run, dual": {"dual": True},
-    "run, on_change, dual": {"send": "on_change", "dual": True},
     "serial, dual": {"labeller": "serial", "dual": True},
 }
 """Differences from the reference Skin."""
@@ -43,55 +39,43 @@ def luts(design: str) -> int:
 
 BLOCK = 25
 
+MOST = 150
+"""Flips of registers, or of memories, of a design."""
+
+NARROW = 0.02
+"""Half width of the interval of the silently wrong share at which a design has enough flips."""
+
 
 class Row(NamedTuple):
     design: str
     found: FlipOutcome
 
 
-def run(
-    names: Sequence[str],
-    registers: int,
-    memories: int,
-    executor: Executor,
-    done: Callable[[int], None],
-    within_s: float | None = None,
-) -> list[Row]:
-    """Flips of ``registers`` register and ``memories`` memory bits of each design. ``done`` receives the number of
-    blocks after each.
-
-    ``within_s``: time after which only each design's first block is begun.
-    """
-    counts = {False: math.ceil(registers / BLOCK), True: math.ceil(memories / BLOCK)}
-    blocks = [(name, memory, block) for memory, count in counts.items() for block in range(count) for name in names]
-    # So that all of them are as far when the time is over.
-    ordered = sorted(blocks, key=lambda each: each[2] / counts[each[1]])
-    todo = {each: executor.submit(_block, *each) for each in ordered}
-    timer = threading.Timer(within_s or 0.0, lambda: [todo[each].cancel() for each in ordered if each[2]])
-    if within_s is not None:
-        timer.start()
-    try:
-        for future in as_completed(todo.values()):
-            if not future.cancelled():
-                future.result()
-                done(len(blocks))
-    finally:
-        timer.cancel()
+def run(names: Sequence[str], executor: Executor, done: Callable[[int], None]) -> list[Row]:
+    """Flips of each design's registers and memories, as many as the interval needs. ``done`` receives the number of
+    tasks after each."""
+    tasks = [(name, memory) for memory in (False, True) for name in names]
+    pending = [executor.submit(_flips, *task) for task in tasks]
+    for future in as_completed(pending):
+        future.result()
+        done(len(tasks))
     return [
         Row(name, FlipOutcome(*one))
-        for memory, count in counts.items()
-        for name in names
-        for one in _first(
-            None if todo[name, memory, block].cancelled() else todo[name, memory, block].result()
-            for block in range(count)
-        )
+        for (name, _), future in zip(tasks, pending, strict=True)
+        for one in future.result()
     ]
 
 
-def _first(blocks: Iterable[list[FlipOutcome] | None]) -> Iterator[FlipOutcome]:
-    """Flips before the first missing block, as a later choice would bias the result."""
-    for found in itertools.takewhile(lambda block: block is not None, blocks):
-        yield from found or ()
+def _flips(design: str, memory: bool) -> list[FlipOutcome]:
+    blocks = itertools.count()
+    found, _ = drawn(lambda _: _block(design, memory, next(blocks)), range(BLOCK, MOST + 1, BLOCK), _enough)
+    return found
+
+
+def _enough(found: Sequence[FlipOutcome]) -> bool | None:
+    silent = sum(FlipOutcome(*one).outcome == "silent" for one in found)
+    low, high = wilson(silent, len(found))
+    return True if high - low <= 2 * NARROW else None
 
 
 def _block(design: str, memory: bool, block: int) -> list[FlipOutcome]:
@@ -138,11 +122,3 @@ def _row(line: dict[str, str]) -> Row:
         fights=int(line["fights"]),
     )
     return Row(line["design"], found)
-
-
-def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    share, part = hits / of, z * z / of
-    middle = (share + part / 2) / (1 + part)
-    half = z * math.sqrt(share * (1 - share) / of + part / 4 / of) / (1 + part)
-    return max(0.0, middle - half), min(1.0, middle + half)

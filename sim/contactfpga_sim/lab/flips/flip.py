@@ -46,12 +46,6 @@ class FlipOutcome(NamedTuple):
     """Clocks in which a column was driven against a row."""
 
 
-def module(name: str) -> str:
-    parts = name.split(".")
-    inner = parts[2:] if parts[0] == "dual" and len(parts) > 2 else parts
-    return "comparison" if parts[0] == "dual" and len(parts) <= 2 else inner[0].split("$")[0]
-
-
 def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
     """Random flips, uniform over clocks and all register, or memory, bits."""
     rng = np.random.default_rng([seed, memory])

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.wire import framing
+from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.flips import touches
 from contactfpga_sim.model.board.state import Checkpoint, StateBoard
 
@@ -56,15 +57,13 @@ class Listener:
             if start == end:
                 continue
             now = int(events["cycle"][end - 1]) / clock_hz
-            for event in self.conversation.receive(data[start:end].tobytes(), now):
-                if isinstance(event, Arrival):
-                    found.append(_heard(event, now, self.conversation.stats.restarts))
-                self.surprises += isinstance(event, SkinMismatch | VersionMismatch)
+            said = self.conversation.receive(data[start:end].tobytes(), now)
+            found += [_heard(zones, now, self.conversation.stats.restarts) for zones in frames_in(said)]
+            self.surprises += sum(isinstance(event, SkinMismatch | VersionMismatch) for event in said)
         return found
 
 
-def _heard(event: Arrival, now: float, restarts: int) -> DeliveredFrame:
-    zones = event.zones
+def _heard(zones: Zones, now: float, restarts: int) -> DeliveredFrame:
     assert zones.time_us is not None
     # The touches of the study jump, and the host says so.
     flagged = bool(zones.flags - {"motion"} or zones.faults)

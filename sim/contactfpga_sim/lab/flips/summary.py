@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
+from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab.flips import campaign
-from contactfpga_sim.lab.flips.campaign import Row, wilson
-from contactfpga_sim.lab.flips.flip import module
+from contactfpga_sim.lab.flips.campaign import Row
 from contactfpga_sim.model.board.state import StateBoard
 
 
@@ -22,15 +21,6 @@ class Design(NamedTuple):
     registers: int
     """Flip-flop bits, including those around memories."""
     memories: int
-
-
-class Share(NamedTuple):
-    hits: int
-    of: int
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        return wilson(self.hits, self.of)
 
 
 def measured(names: Iterable[str]) -> list[Design]:
@@ -61,23 +51,11 @@ def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
     return [row for row in rows if row.design == design and row.found.memory == memory]
 
 
-def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
-    return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
+def share(rows: Sequence[Row], outcome: str = "silent") -> Rate:
+    return Rate(sum(row.found.outcome == outcome for row in rows), len(rows))
 
 
 def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
     """Median and longest silently wrong output, in ms."""
     times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
     return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
-
-
-def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
-    """Rows by ``key``, the most silently wrong first."""
-    parts: dict[str, list[Row]] = defaultdict(list)
-    for row in rows:
-        parts[key(row)].append(row)
-    return dict(sorted(parts.items(), key=lambda part: (-share(part[1]).hits, -len(part[1]), part[0])))
-
-
-def stage(row: Row) -> str:
-    return module(row.found.name)

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.stats import Rate
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.flips import campaign, summary
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.summary import Design
@@ -22,13 +24,8 @@ COLUMNS = (
     "wrong for, ms: longest / median",
     "reported",
 )
-MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
-KINDS = ("design", "outcome", "by", "flips")
-REGISTERS, MEMORIES = 400, 100
-LONGEST_S = 25 * 60.0
 LONG_S = 0.005
 """Time above which a fault spoils many frames."""
-OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 
 
 class FlipResults(NamedTuple):
@@ -37,10 +34,10 @@ class FlipResults(NamedTuple):
 
 
 def compute() -> FlipResults:
-    """As many flips as time allows, and the size of each design."""
+    """Flips, and the size of each design."""
     with pool.executor() as executor, pool.progress() as step:
-        done = functools.partial(step, "blocks of flips")
-        rows = campaign.run(list(DESIGNS), REGISTERS, MEMORIES, executor, done, LONGEST_S)
+        done = functools.partial(step, "designs flipped")
+        rows = campaign.run(list(DESIGNS), executor, done)
     return FlipResults(rows, summary.measured(DESIGNS))
 
 
@@ -82,7 +79,7 @@ def _worst(rows: Sequence[Row]) -> str:
     silent = summary.share(rows)
     wrong = [row for row in rows if row.found.outcome == "silent"]
     worst = max(wrong or rows, key=_seconds)
-    long = summary.Share(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
+    long = Rate(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
     what = (
         f"one of `{worst.found.name}` in `{worst.design}` was silently wrong for {1e3 * worst.found.seconds:,.1f} ms "
         f"({worst.found.kind}). "
@@ -95,8 +92,8 @@ def _worst(rows: Sequence[Row]) -> str:
     )
 
 
-def designs_table(found: FlipResults) -> str:
-    lines = []
+def designs_table(found: FlipResults) -> writer.Table:
+    lines, shown = [], []
     for design in found.designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
             some = summary.of(found.rows, design.name, memory)
@@ -106,44 +103,23 @@ def designs_table(found: FlipResults) -> str:
             first = ("", "") if memory else (f"`{design.name}`", f"{design.luts:,}")
             silent, told = summary.share(some), summary.share(some, "told")
             lines.append(
-                writer.line(
-                    (
-                        *first,
-                        f"{bits:,} of {'memory' if memory else 'registers'}",
-                        f"{len(some):,}",
-                        f"**{100 * silent.hits / silent.of:.1f} %**, {_interval(silent)}",
-                        f"{longest:,.1f} / {median:,.1f}" if silent.hits else "",
-                        f"{100 * told.hits / told.of:.1f} %",
-                    )
+                (
+                    *first,
+                    f"{bits:,} of {'memory' if memory else 'registers'}",
+                    f"{len(some):,}",
+                    f"**{100 * silent.hits / silent.of:.1f} %**, {_interval(silent)}",
+                    f"{longest:,.1f} / {median:,.1f}" if silent.hits else "",
+                    f"{100 * told.hits / told.of:.1f} %",
                 )
             )
-    return writer.table(COLUMNS, lines)
+            shown += [] if memory else [lines[-1]]
+    columns = [name for name in COLUMNS if name not in ("bits", "flips")]
+    return writer.Table(COLUMNS, lines, lambda row: row in shown, columns)
 
 
-def _interval(share: summary.Share) -> str:
-    low, high = share.interval
+def _interval(share: Rate) -> str:
+    low, high = share.interval()
     return f"{100 * low:.1f} to {100 * high:.1f} %"
-
-
-def modules_table(found: FlipResults) -> str:
-    plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
-    lines = []
-    for module, some in summary.by(plain, summary.stage).items():
-        counts = [summary.share(some, outcome).hits for outcome in ("silent", "told", "masked")]
-        names = summary.by([row for row in some if row.found.outcome == "silent"], lambda row: row.found.name)
-        listed = ", ".join(f"`{name}` {len(hits)}" for name, hits in list(names.items())[:6])
-        lines.append(writer.line((module, str(len(some)), *map(str, counts), listed)))
-    return writer.table(MODULES, lines)
-
-
-def ways_table(found: FlipResults) -> str:
-    lines = []
-    for design in found.designs:
-        some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]
-        for way, hits in summary.by(some, lambda row: f"{row.found.outcome}|{row.found.kind}").items():
-            outcome, kind = way.split("|")
-            lines.append(writer.line((f"`{design.name}`", OUTCOMES[outcome], kind, str(len(hits)))))
-    return writer.table(KINDS, lines)
 
 
 def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
@@ -157,7 +133,7 @@ def _plot(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
         axes = figure.subplots()
         for row, design in enumerate(shown):
             share = summary.share(summary.of(rows, design.name, memory=False))
-            low, high = (100 * end for end in share.interval)
+            low, high = (100 * end for end in share.interval())
             color = style.BLUE if design in plain else style.VERMILLION
             axes.plot([low, high], [row, row], color=color, lw=2)
             axes.plot(100 * share.hits / share.of, row, "o", ms=7, color=color, clip_on=False, zorder=3)

@@ -18,10 +18,9 @@ from contactfpga.robot.haptics import Contact, Contacts, Cylinder, LoadCells, To
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import hexapod
 from contactfpga.surfaces.shapes import Floats
-from contactfpga_sim.lab.failures.knob import Knob, Outcome
-from contactfpga_sim.lab.failures.rated import LOOKS, SHARE, Rated
 from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
+from contactfpga_sim.lab.knobs import LOOKS, Knob, Outcome, Rated
 
 HOLDS = 0.9
 """Required share of contacts within the stated interval, below 95 % to allow for chance."""
@@ -200,39 +199,39 @@ CLOSINGS = CoverageCase("closings", 5.0, RAMP)
 KNOBS = {
     knob.name: knob
     for knob in (
-        Knob("unseen", "A second contact that the sheet does not show", "its push, N", SHARE,
+        Knob("unseen", "A second contact that the sheet does not show", "its push, N",
               (0, 0.1, 0.2, 0.5, 1, 2, 4, 8), _both(lambda value: Disturbance(unseen_n=value)),
               "look at `alarm`; trust neither force nor place where it is set"),
-        Knob("drift", "A unit whose zero has drifted", "drift, N", SHARE, (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
+        Knob("drift", "A unit whose zero has drifted", "drift, N", (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
               _both(lambda value: Disturbance(drift_n=value)), "`haptics zero` while nothing touches; `DriftWatch`"),
-        Knob("torsion", "A contact that turns about its normal", "torsion, Nm", SHARE,
+        Knob("torsion", "A contact that turns about its normal", "torsion, Nm",
               (0, 0.002, 0.005, 0.01, 0.02, 0.05), _both(lambda value: Disturbance(torsion_nm=value)),
               "the center of pressure, which measures the torsion"),
-        Knob("clipping", "A unit that reads no more than this", "end of its range, N", SHARE,
+        Knob("clipping", "A unit that reads no more than this", "end of its range, N",
               (20, 14, 12, 10, 8, 6, 4), _both(lambda value: Disturbance(ends_n=value)),
               "units for the loads that `haptics place` names; `saturated`"),
-        Knob("lifted", "Units that only push, on springs", "preload, N", SHARE, (20, 14, 12, 10, 8, 6, 4),
+        Knob("lifted", "Units that only push, on springs", "preload, N", (20, 14, 12, 10, 8, 6, 4),
               _both(lambda value: Disturbance(preload_n=value)), "more preload; `lifted`"),
-        Knob("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm", SHARE,
+        Knob("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm",
               (0, 2, 5, 10, 20, 40), _both(lambda value: Disturbance(elsewhere_m=1e-3 * value)),
               "`contactfpga doctor --watch` names the switch; `mask`"),
-        Knob("shape", "A ball that is taken for a point", "its radius, mm", SHARE, (1, 2, 3, 5, 8, 12, 19),
+        Knob("shape", "A ball that is taken for a point", "its radius, mm", (1, 2, 3, 5, 8, 12, 19),
               _places(("set, 5 mm", CoverageCase("set", 5.0, true=PATCH)),
                       ("closings, 5 mm", dataclasses.replace(CLOSINGS, true=PATCH)),
                       ball=lambda value: Ball(1e-3 * value, 4.6e5)),
               "the right `Model`; with several, the one that agrees"),
-        Knob("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push", SHARE,
+        Knob("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push",
               (0.1, 0.3, 0.45, 0.55, 0.7, 0.9, 1.2),
               {"interval": _rated(functools.partial(_friction, "interval"), SLOW),
                f"estimate, {CLOSE_N:g} N": _rated(functools.partial(_friction, "estimate"))},
               "a larger `friction`: intervals grow, but hold"),
-        Knob("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
+        Knob("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms",
               (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
               _places(("closings, 0.5 N of noise", CLOSINGS),
                       ("closings, 0.1 N, no spread", CoverageCase("closings", 5.0, RAMP, 0.0, 0.1)),
                       late_n=lambda value: 1.6 * value),
               "units on the board, which has one clock"),
-        Knob("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
+        Knob("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm",
               (12, 8, 5, 2, 0, -1, -2, -3),
               _places(("barycenter, 5 mm", CoverageCase("barycenter", 5.0, RAMP, 0.0, 0.0)),
                       ("set, 5 mm", CoverageCase("set", 5.0)),

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga.inputs.files import write_text
 from contactfpga.robot.haptics import Cylinder, rate
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.failures import knob_pictures, tables
-from contactfpga_sim.lab.failures.knob import Sweep
-from contactfpga_sim.lab.haptics import breaks, coverage, felt, pairs
-from contactfpga_sim.lab.haptics.coverage import CoverageCase
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab import knobs, writer
+from contactfpga_sim.lab.failures import tables
+from contactfpga_sim.lab.haptics import breaks, coverage, felt
+from contactfpga_sim.lab.haptics.coverage import Coverage, CoverageCase
 from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
 LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
@@ -53,8 +54,7 @@ def _layout(rating: Rating, before: str = "") -> list[str]:
 
 def places_table() -> str:
     rows = [["method", "pitch", "error", "the barycenter's", "stated radius", "over theory", "covers"]]
-    for case in coverage.RIGHT:
-        found = coverage.run(case, CONTACTS)
+    for case, found in _covered(coverage.RIGHT):
         theory = "" if math.isnan(found.theory_m) else f"{found.radius_m / found.theory_m:.2f}"
         lengths = [f"{1e3 * one:.2f} mm" for one in (found.rms_m, found.barycenter_m, found.radius_m)]
         rows.append([case.method, f"{case.pitch_mm:g} mm", *lengths, theory, _percent(found.covered)])
@@ -63,11 +63,15 @@ def places_table() -> str:
 
 def wrong_table() -> str:
     rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
-    for case in coverage.WRONG:
-        found = coverage.run(case, CONTACTS)
+    for case, found in _covered(coverage.WRONG):
         lengths = [f"{1e3 * one:.2f} mm" for one in (found.rms_m, found.barycenter_m, found.radius_m)]
         rows.append([_named(case), case.wrong, *lengths, _percent(found.covered), _percent(found.disagreed)])
     return writer.table_of(rows)
+
+
+def _covered(cases: Sequence[CoverageCase]) -> Iterator[tuple[CoverageCase, Coverage]]:
+    with pool.executor() as workers:
+        yield from zip(cases, workers.map(coverage.run, cases, itertools.repeat(CONTACTS)), strict=True)
 
 
 def _named(case: CoverageCase) -> str:
@@ -78,22 +82,17 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def draw(folder: Path) -> list[Path]:
-    return [rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *draw_felt(folder)]
-
-
 END_TO_END = 100
 """Contacts per line; `make campaign` presses 1,000 in all."""
 
-LIMITS = 1000
 APART_MM = (30.0, 60.0, 100.0)
-SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
 
 @functools.cache
 def found(setting: Setting, count: int = END_TO_END, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
     """(contacts, times) errors in m by method."""
-    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
+    with pool.executor() as workers:
+        each = list(workers.map(felt.errors, itertools.repeat(setting), range(count), itertools.repeat(times_s)))
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 
@@ -104,62 +103,33 @@ def interval(errors: np.ndarray) -> tuple[float, float, float]:
     return math.sqrt(mean), math.sqrt(max(0.0, mean - half)), math.sqrt(mean + half)
 
 
-def felt_table() -> str:
-    rows = [["sheet", "method", *(f"{1e3 * one:g} ms" for one in SHOWN_S)]]
-    for setting in SETTINGS:
-        for method, errors in found(setting).items():
-            cells = []
-            for time_s in SHOWN_S:
-                middle, low, high = interval(errors[:, TIMES_S.index(time_s)])
-                cells.append(f"{1e3 * middle:.2f} ({1e3 * low:.2f} to {1e3 * high:.2f}) mm")
-            rows.append([setting.name, method, *cells])
-    return writer.table_of(rows)
-
-
-def pairs_table() -> str:
-    rows = [["contacts", "apart", "error of a push", "95 % interval"]]
+def pairs_table() -> writer.Table:
+    rows = []
     for kind in felt.KINDS:
         for apart in APART_MM:
             each = [felt.two(apart, seed, kind) for seed in range(END_TO_END)]
             off = np.array([one for pair in each for one in pair.off_n])
             middle, low, high = interval(off)
             rows.append([kind, f"{apart:g} mm", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
-    return writer.table_of(rows)
+    head = ("contacts", "apart", "error of a push", "95 % interval")
+    return writer.Table(head, rows, lambda row: row[1] == f"{APART_MM[1]:g} mm")
 
 
-def limits_table() -> str:
-    rows = [["how fingers are located", "error of a push", "95 % interval"]]
-    for method, errors in pairs.errors(60.0, LIMITS).items():
-        middle, low, high = interval(errors)
-        rows.append([method, f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
-    return writer.table_of(rows)
+def breaks_table() -> writer.Table:
+    """The page shows knobs whose first method fails unnoticed."""
+    swept = knobs.sweeps(breaks.__name__)
+    rows = [row for name, methods in swept.items() for row in tables.rows(breaks.KNOBS[name], methods)]
+    return writer.Table(
+        tables.HEAD,
+        rows,
+        lambda row: row[0] and "**not noticed" in row[6],
+        ("knob", "breaks at", "reported", "what helps"),
+    )
 
 
-@functools.cache
-def swept() -> dict[str, dict[str, Sweep]]:
-    return {name: knob.sweep() for name, knob in breaks.KNOBS.items()}
-
-
-def breaks_table() -> str:
-    lines = [line for name, methods in swept().items() for line in tables.rows(breaks.KNOBS[name], methods)]
-    return writer.table(tables.HEAD, lines)
-
-
-SAID = {"lifted": "The picture is that of [`clipping`](#clipping), but `lifted` reports every break."}
-
-
-def breaks_pictures() -> str:
-    return tables.headed(breaks.KNOBS, "haptics", SAID)
-
-
-def draw_felt(folder: Path) -> list[Path]:
-    drawn = [_front(folder / "haptics-front.svg")]
-    (folder / "haptics").mkdir(exist_ok=True)
-    for name in (one for one in breaks.KNOBS if one not in SAID):
-        path = folder / "haptics" / f"{name}.svg"
-        write_text(path, knob_pictures.svg(breaks.KNOBS[name], swept()[name]))
-        drawn.append(path)
-    return drawn
+def draw(folder: Path) -> list[Path]:
+    placed = rate.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M))
+    return [placed, _front(folder / "haptics-front.svg")]
 
 
 COLORS = (style.SKY, style.ORANGE, style.PURPLE, style.BLACK)

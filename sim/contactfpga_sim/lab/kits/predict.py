@@ -31,9 +31,9 @@ from contactfpga.design.sheet.extract import extracted
 from contactfpga.driver import health
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga_sim.lab.finger import stages
-from contactfpga_sim.lab.spread import MixedTimes
-from contactfpga_sim.lab.usb import BridgeSettings, delivered
+from contactfpga_sim.apps.latency import stages
+from contactfpga_sim.apps.latency.spread import MixedTimes
+from contactfpga_sim.apps.latency.usb import BridgeSettings, delivered
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 DRAWS = 200

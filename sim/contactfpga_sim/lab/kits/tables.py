@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import collections
 import csv
+import functools
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from contactfpga.boards import BOARDS
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
@@ -17,16 +17,16 @@ from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
-from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, placed
-from contactfpga_sim.lab import latency, writer
-from contactfpga_sim.lab.finger import stages
-from contactfpga_sim.lab.finger.stages import Finger
-from contactfpga_sim.lab.spread import Spread
-from contactfpga_sim.lab.usb import BridgeSettings
+from contactfpga_sim.apps import pool
+from contactfpga_sim.apps.latency import stages
+from contactfpga_sim.apps.latency.spread import Spread
+from contactfpga_sim.apps.latency.stages import Finger
+from contactfpga_sim.apps.latency.usb import BridgeSettings
+from contactfpga_sim.lab import writer
 
 NAMES = ("starter", "fast")
-SEEDS = (1, 2, 3, 4, 5)
+SEEDS = (1, 2, 3)
 """Seeds of place and route."""
 COVER = "| run, 6.4 mm, tiles |"
 PAPER = "| run, 6.4 mm, paper |"
@@ -54,9 +54,13 @@ def compute() -> list[KitFigures]:
 def _figures(kit: Kit) -> KitFigures:
     settings = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
     finger = stages.measure(kit.skin, settings, host_touches=0)
+    with pool.executor() as workers:
+        return KitFigures(kit, finger, tuple(workers.map(functools.partial(_built, kit), SEEDS)))
+
+
+def _built(kit: Kit, seed: int) -> placed.Report:
     with tempfile.TemporaryDirectory() as folder:
-        reports = tuple(build.build(kit.skin, kit.board, Path(folder), seed) for seed in SEEDS)
-    return KitFigures(kit, finger, reports)
+        return build.build(kit.skin, kit.board, Path(folder), seed)
 
 
 def _worst_first(us: Spread, digits: int = 0) -> str:
@@ -131,11 +135,10 @@ def _peak(sheet: tuple[str, float, float, float], way: str) -> str:
     return f"{worst} / {mean}"
 
 
-def times_table(found: list[KitFigures]) -> str:
-    return writer.table(
-        ("kit", "stage", "median, us", "99 %, us", "worst, us"),
-        (writer.line(row) for one in found for row in _stages(one)),
-    )
+def times_table(found: list[KitFigures]) -> writer.Table:
+    rows = [row for one in found for row in _stages(one)]
+    head = ("kit", "stage", "median, us", "99 %, us", "worst, us")
+    return writer.Table(head, rows, lambda row: "USB controller" not in row[1])
 
 
 def _stages(one: KitFigures) -> Iterator[tuple[str, ...]]:
@@ -171,68 +174,35 @@ def built_table(found: list[KitFigures]) -> str:
     return writer.table(("kit", "FPGA", "LUT4", "block RAMs", f"Fmax, slowest of {len(SEEDS)} seeds", "needed"), lines)
 
 
-def pins_table() -> str:
-    """Sheets for an iCEBreaker's 23 pins."""
-    kit = kits.kit("starter").skin
-    cases = {
-        "16x16, rows on registers, columns driven back (the kit)": kit,
-        "the same, pull-ups of 22 kΩ alone": kit.replace(precharge_us=0.0, release_us=4.0),
-        "16x16, rows and columns on registers, 22 kΩ": kit.replace(
-            precharge_us=0.0, release_us=4.0, column_read="74hc165"
-        ),
-        "10x10, each line on a pin, columns driven back": kit.replace(rows=10, columns=10, row_drive="direct"),
-        "10x10, each line on a pin, line reversal": _reversal(kit),
-    }
-    lines = []
-    for name, skin in cases.items():
-        BOARDS["icebreaker"].check(skin)
-        found = latency.measure(skin, touches=49)
-        wires = sum(len(pins) for pins in BOARDS["icebreaker"].pins(skin).values())
-        lines.append(
-            writer.line(
-                (
-                    name,
-                    str(wires),
-                    f"{skin.rows * skin.columns}",
-                    _worst_first(found.touch_to_contact_us, 1),
-                    _worst_first(found.touch_to_last_byte_us, 1),
-                )
-            )
-        )
-    return writer.table(
-        ("sheet", "pins of 23", "cells", "to the pin, worst / median", "to the last byte, worst / median"), lines
-    )
-
-
-def _reversal(skin: Skin) -> Skin:
-    fast = kits.kit("fast").skin
-    times = {name: getattr(fast, name) for name in ("scan", "settle_us", "release_us", "project_us", "send")}
-    return skin.replace(rows=10, columns=10, row_drive="direct", **times)
-
-
-def parts_table() -> str:
-    lines = []
+def parts_table() -> writer.Table:
+    rows = []
     for name in NAMES:
         kit = kits.kit(name)
         layout = lay_out(kit.skin, load_circuit(kit.skin_path))
         counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
         for (order, value), count in counted.items():
             shown = ohms(float(value)) if value.isdigit() else ""
-            lines.append(writer.line((name, "sheet", str(count), order, shown)))
+            rows.append((name, "sheet", str(count), order, shown))
         for other in kit.parts:
             maker = " ".join(filter(None, (other.maker, other.number)))
-            lines.append(writer.line((name, "beside it", str(other.count), other.what, maker)))
-    return writer.table(("kit", "where", "count", "what", "value or maker's number"), lines)
+            rows.append((name, "beside it", str(other.count), other.what, maker))
+    head = ("kit", "where", "count", "what", "value or maker's number")
+    return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
 
 
-def predictions_table() -> str:
+PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n")
+"""Predictions that the page shows."""
+
+
+def predictions_table() -> writer.Table:
     both = {name: predictions.load(kits.kit(name)) for name in NAMES}
     lines = []
     for key in dict.fromkeys(key for found in both.values() for key in found):
         any_one = next(found[key] for found in both.values() if key in found)
         cells = [_interval(both[name][key]) if key in both[name] else "" for name in NAMES]
-        lines.append(writer.line((f"`{key}`", any_one.what, any_one.unit, *cells)))
-    return writer.table(("name", "what", "unit", *NAMES), lines)
+        lines.append((f"`{key}`", any_one.what, any_one.unit, *cells))
+    head = ("name", "what", "unit", *NAMES)
+    return writer.Table(head, lines, lambda row: row[0].strip("`") in PREDICTED, head[1:])
 
 
 def _interval(one: predictions.Prediction) -> str:

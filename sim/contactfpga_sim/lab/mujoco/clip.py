@@ -1,20 +1,15 @@
-"""Arms of docs/mujoco.md side by side: peak forces, and a clip."""
+"""Peak forces of the arms of docs/mujoco.md, side by side."""
 
 from __future__ import annotations
 
 import dataclasses
-import io
 import math
-from pathlib import Path
 
 import numpy as np
 
 import contactfpga
-from contactfpga.tools.view import opening
-from contactfpga.tools.view.opening import ServedView
-from contactfpga.tools.view.simulated import ALL, KIT, SKINS, SimulatedSource
-from contactfpga.tools.view.sources import SimulatedPace
-from contactfpga_sim.lab.view import browser
+from contactfpga.driver.pace import Pace
+from contactfpga.tools.view.simulated import ALL, SKINS, SimulatedSource
 from contactfpga_sim.lab.writer import table_of
 
 ARM = contactfpga.examples() / "arm"
@@ -25,15 +20,9 @@ NEAR_RAD, SPREAD_RAD = 0.4, 0.01
 """Start angle before the bar, and its range, for random phases of scan and step."""
 STEP_S, ENDS_S = 1e-3, 0.25
 """MuJoCo's step, and a time by which all arms touched the bar and all but one let go."""
-COMES_S, TOUCHES_S = (1.38, 2.18), (2.18, 2.292)
-"""Times of approach and slow motion."""
-COMING, TOUCHING, STANDING = 10, 28, 15
-FRAME_MS, SETTLE_MS, QUALITY = 100, 900, 55
-WIDTH, HEIGHT, TALL = 1120, 400, 700
-"""Pixels; TALL while choosing, lest the panel scroll."""
 
 
-class Asked(SimulatedPace):
+class Asked(Pace):
     """A pace that runs the robots up to a given moment."""
 
     until_s = 0.0
@@ -95,43 +84,3 @@ def _ranged(values: np.ndarray) -> str:
     if np.isnan(values).any():
         return "never"
     return f"{np.median(values):.1f} ({values.min():.1f} to {values.max():.1f})"
-
-
-def draw(folder: Path) -> Path:
-    named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
-    clip = folder / "arms.webp"
-    with opening.opened(named, http_port=0) as shown, browser.visit(shown, WIDTH, TALL, dark=True) as visitor:
-        record(shown, visitor, clip)
-    return clip
-
-
-def record(shown: ServedView, visitor: browser.Visitor, clip: Path) -> None:
-    from PIL import Image
-
-    robots = shown.source
-    assert isinstance(robots, SimulatedSource)
-    browser.tidy(visitor)
-    visitor.choose(robots.reflex, REFLEX)
-    visitor.choose(KIT, ALL)
-    while len(robots.copies) < len(SKINS):
-        visitor.page.wait_for_timeout(50)
-    visitor.page.wait_for_timeout(SETTLE_MS)  # the page says where its camera is now
-    visitor.page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
-    pace = paced(robots)
-    visitor.page.wait_for_timeout(SETTLE_MS)
-    began_s = robots.simulated_s
-    frames = []
-    for at_s in moments():
-        pace.until_s = began_s + at_s
-        while robots.simulated_s < pace.until_s - 1e-9:
-            visitor.page.wait_for_timeout(50)
-        visitor.page.wait_for_timeout(SETTLE_MS)  # the panel is written four times a second
-        frames.append(Image.open(io.BytesIO(visitor.page.screenshot())).convert("RGB"))
-    durations = [FRAME_MS] * (len(frames) - 1) + [FRAME_MS * STANDING]
-    frames[0].save(clip, save_all=True, append_images=frames[1:], duration=durations, loop=0, quality=QUALITY)
-
-
-def moments() -> list[float]:
-    """Time of each frame since the start."""
-    spans = ((*COMES_S, COMING), (*TOUCHES_S, TOUCHING))
-    return [begin + (end - begin) * step / count for begin, end, count in spans for step in range(1, count + 1)]

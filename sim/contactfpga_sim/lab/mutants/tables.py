@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from contactfpga.skin.several import Several
-from contactfpga_sim.lab import kept, pool, writer
+from contactfpga_sim.apps import kept, pool
+from contactfpga_sim.lab import writer
 from contactfpga_sim.verify.mutants import campaign, proof
 from contactfpga_sim.verify.mutants.campaign import Result, chosen, examine
 from contactfpga_sim.verify.mutants.netlist import STAGES, Mutant
@@ -28,15 +29,15 @@ def compute() -> dict[str, list[Result]]:
     return run([name for group in GROUPS.values() for name in group], EACH, 0, proof.LONG_S, pool.usual_jobs or JOBS)
 
 
-def mutants_table(found: Mapping[str, Sequence[Result]]) -> str:
+def mutants_table(found: Mapping[str, Sequence[Result]]) -> writer.Table:
     return table(_all(found, SKINS))
 
 
-def options_table(found: Mapping[str, Sequence[Result]]) -> str:
+def options_table(found: Mapping[str, Sequence[Result]]) -> writer.Table:
     return table(_all(found, OPTIONS))
 
 
-def several_table(found: Mapping[str, Sequence[Result]]) -> str:
+def several_table(found: Mapping[str, Sequence[Result]]) -> writer.Table:
     return table(_all(found, SEVERAL))
 
 
@@ -44,16 +45,17 @@ def _all(found: Mapping[str, Sequence[Result]], names: Iterable[str]) -> list[Re
     return [result for name in names for result in found[name]]
 
 
-def table(results: Sequence[Result]) -> str:
-    """Counts by stage; shares are of mutants not proved equivalent."""
-    rows = [["stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest"]]
+def table(results: Sequence[Result]) -> writer.Table:
+    """Counts by stage; shares are of mutants not proved equivalent. The page shows stages with survivors."""
+    rows = []
     drawn = {result.mutant.stage for result in results}
     for stage in [*(stage for stage in STAGES if stage in drawn), "all"]:
         fates = [result.fate for result in results if stage in ("all", result.mutant.stage)]
         killed, equivalent, alive = (fates.count(fate) for fate in ("killed", "equivalent", "alive"))
         share = f"{100 * killed / (killed + alive):.1f} %" if killed + alive else ""
         rows.append([stage, f"{len(fates):,}", f"{killed:,}", str(equivalent), str(alive), share])
-    return writer.table_of(rows)
+    head = ("stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest")
+    return writer.Table(head, rows, lambda row: row[0] == "all" or row[4] != "0")
 
 
 def listed(results: Iterable[Result]) -> str:

@@ -36,16 +36,17 @@ def batch_table() -> str:
     return writer.table_of(rows)
 
 
-def links_table() -> str:
+def links_table() -> writer.Table:
     head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
-    rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
+    rows = []
     for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
         found = measured(links, GROWTH_MS, full=full)
         name = f"{links}" + (f", and one of {load.FULL_HZ:,.0f} Hz" if full else "")
         cpu = (_percent(used / found.links) for used in _ends(found))
         rates = (f"{found.frames:,.0f}", f"{100 * found.share:.1f} %", f"{found.lost}")
         rows.append((name, *rates, *cpu, _ms(found.latency), _ratio(found)))
-    return writer.table_of(rows)
+    heads = (*head, "latency p50 / p99", "in times of a bare pair's")
+    return writer.Table(heads, rows, lambda row: row[0].isdecimal(), ("links", "of those sent", "latency p50 / p99"))
 
 
 def _ends(found: load.NetworkRun) -> tuple[float, float, float]:

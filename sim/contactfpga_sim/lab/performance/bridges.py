@@ -7,10 +7,10 @@ from typing import NamedTuple
 from contactfpga.boards import BOARDS
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
+from contactfpga_sim.apps.latency import stages
+from contactfpga_sim.apps.latency.spread import Spread
+from contactfpga_sim.apps.latency.usb import DEFAULT_TIMER_MS, BridgeSettings
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.finger import stages
-from contactfpga_sim.lab.spread import Spread
-from contactfpga_sim.lab.usb import DEFAULT_TIMER_MS, BridgeSettings
 
 TOUCHES = 24
 

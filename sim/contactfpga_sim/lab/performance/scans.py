@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import latency, writer
+from contactfpga_sim.apps.latency import board as latency
+from contactfpga_sim.lab import writer
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import frames_in
-from contactfpga_sim.model.scenes.recordings import Recording
 
 INSTANTS = 96
-
-RECORDINGS = Path("../shared/data")
 
 SETTINGS = {
     "reference": Skin(),
@@ -121,11 +118,6 @@ def report_row(name: str, skin: Skin) -> str:
     scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
     times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
     return writer.line((name, f"`{skin.report}`", str(skin.derived.record_bytes), *times))
-
-
-def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
-    """(n, R, C) bool frames of each recording in the folder."""
-    return {path.name.partition(".")[0]: Recording.load(path).pressed for path in sorted(folder.glob("*.npz"))}
 
 
 def reference_sample() -> str:

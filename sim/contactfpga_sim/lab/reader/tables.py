@@ -10,12 +10,11 @@ import os
 import numpy as np
 
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.reader import latency, links, loop
+from contactfpga_sim.lab.reader import latency, loop
 from contactfpga_sim.lab.reader.feeder import PACES, Pace
 from contactfpga_sim.lab.reader.latency import READERS, Found
 
 ROUNDS = 1
-LINKS = (16, "latest"), (16, "batch"), (64, "latest"), (64, "batch")
 
 
 def times(streams: list[Found]) -> tuple[float, float]:
@@ -72,16 +71,6 @@ def loop_table() -> str:
             beside = "a thread that computes" if busy else "nothing"
             missed = f"{found.missed:,} of {found.deadlines:,}"
             rows.append([beside, f"{switch_s * 1e3:g} ms", f"`{reader}`", missed, str(found.silent)])
-    return writer.table_of(rows)
-
-
-def links_table(asked: tuple[tuple[int, str], ...] = LINKS) -> str:
-    rows = [["links of 1 kHz", "each 10 ms", "reader", "of a core", "frames that came in time", "age"]]
-    for count, call in asked:
-        for reader in READERS:
-            found = links.measured(reader, count, call)
-            shares = [f"{100 * share:.0f} %" for share in (found.used, found.came)]
-            rows.append([str(count), f"`{call}()`", f"`{reader}`", *shares, f"{found.age_ms:.1f} ms"])
     return writer.table_of(rows)
 
 

@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
+from contactfpga.recordings import Recording, Session
 from contactfpga.skin import Skin
-from contactfpga.tools.recordings import Recording, link_recorder
-from contactfpga.tools.recordings.export import export
+from contactfpga.tools.recordings.link_recorder import LinkRecorder
 from contactfpga.tools.recordings.recover import recover
-from contactfpga.tools.recordings.session import Session
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
@@ -79,26 +78,6 @@ def cost(source: Path, seconds: float, into: Path, bytes_only: bool) -> Cost:
 
 
 @dataclasses.dataclass(frozen=True)
-class Reading:
-    """Frames per CPU second."""
-
-    frames: float
-    rows: float
-    """Rows of a table, with tracks."""
-    parquet_bytes: float
-
-
-def reading(path: Path, into: Path) -> Reading:
-    """Read and export a recording."""
-    recording = Recording(path)
-    before = time.process_time()
-    count = sum(1 for _ in recording.frames())
-    read_s, before = time.process_time() - before, time.process_time()
-    rows = export(recording, into)
-    return Reading(count / read_s, rows / (time.process_time() - before), into.stat().st_size / rows)
-
-
-@dataclasses.dataclass(frozen=True)
 class Loss:
     came: int
     lost: int
@@ -129,15 +108,16 @@ def _record(port: str, file: str, log: str) -> None:
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
     count = 0
 
-    class Logged(link_recorder.Buffer):
-        def take(self, data: bytes, clock_s: float) -> None:
-            nonlocal count
-            super().take(data, clock_s)
-            count += len(data)
-            os.write(descriptor, _PIECE.pack(time.monotonic(), count))
+    take = LinkRecorder.take
 
-    session = Session(file, buffer=Logged)
-    with session:
+    def logged(link: LinkRecorder, data: bytes, clock_s: float) -> None:
+        nonlocal count
+        take(link, data, clock_s)
+        count += len(data)
+        os.write(descriptor, _PIECE.pack(time.monotonic(), count))
+
+    LinkRecorder.take = logged  # type: ignore[assignment, method-assign]
+    with Session(file) as session:
         session.add(port, name="skin")
         session.start()
         while session.running:

@@ -46,21 +46,6 @@ def sizes_table() -> str:
     return writer.table_of(rows)
 
 
-def reading_table() -> str:
-    with compute.folder() as place:
-        compute.cost(stream(10_000), SECONDS[10_000], place / "x.mcap", False)
-        found = compute.reading(place / "x.mcap", place / "x.parquet")
-    rows = [
-        ("reading", "per CPU second"),
-        ("`Recording.frames()`", f"{found.frames:,.0f} frames"),
-        (
-            "`contactfpga export`, with tracks",
-            f"{found.rows:,.0f} rows, {found.parquet_bytes:.1f} bytes each in Parquet",
-        ),
-    ]
-    return writer.table_of(rows)
-
-
 def loss_table() -> str:
     with compute.folder() as place:
         found = [compute.loss(stream(10_000), 0.5 + 0.237 * kill, place / str(kill)) for kill in range(KILLS)]

@@ -19,16 +19,14 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
-def faults_table() -> str:
-    head = [
-        "fault",
-        "effect if undetected",
-        "reported by",
-        "worst detection time",
-        "time until `contact` rises",
-        "wrong frames before detection",
-    ]
-    rows = [[*head, "without options", "what you must do"]]
+SHOWN = ("broken row", "closed switch", "dead switch", "shorted diode", "dead board", "broken contact")
+"""Faults that the page shows."""
+
+
+def faults_table() -> writer.Table:
+    columns = ("fault", "reported by", "worst detection time", "what you must do")
+    effects = ("time until `contact` rises", "wrong frames before detection", "without options")
+    rows = []
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
         rows.append(
@@ -43,7 +41,9 @@ def faults_table() -> str:
                 fault.left,
             ]
         )
-    return writer.table_of(rows)
+    titles = [FAULTS[name].title for name in SHOWN]
+    head = (columns[0], "effect if undetected", *columns[1:3], *effects, columns[3])
+    return writer.Table(head, rows, lambda row: row[0] in titles, columns)
 
 
 def coverage_table() -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga.design.circuit import Circuit, patterns, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
-from contactfpga_sim.lab.failures.knob import Knob, Outcome, Sweep
+from contactfpga_sim.lab.knobs import Knob, Outcome, Sweep
 
 SETTLE_US, PRECHARGE_US = 0.5, 0.25
 SIZE = 16
@@ -60,7 +60,6 @@ KNOBS = {
             name="coupling",
             title="Lines that lie close",
             axis="capacitance to each neighbor, pF",
-            amount="lowest level of the one unpressed column of a row, V",
             values=tuple(np.geomspace(1, 100, 25).round(2).tolist()),
             runs={
                 "16x16, 30 pF a line": functools.partial(_dip, Circuit()),
@@ -73,7 +72,6 @@ KNOBS = {
             name="contacts",
             title="Slow contacts",
             axis="resistance of a closed switch, ohm",
-            amount="time to settle, µs",
             values=tuple(np.geomspace(50, 10_000, 25).round().tolist()),
             runs={
                 "16x16, 30 pF a line": functools.partial(_contact, Circuit()),
@@ -85,7 +83,6 @@ KNOBS = {
             name="lines",
             title="Long lines",
             axis="capacitance of a line, pF",
-            amount="time to settle, µs",
             values=tuple(np.geomspace(10, 1000, 25).round().tolist()),
             runs={
                 "16x16, lines of 0 Ω": functools.partial(_line, 0.0),
@@ -98,7 +95,6 @@ KNOBS = {
             name="columns",
             title="Many columns at one row",
             axis="rows and columns",
-            amount="time to settle, µs",
             values=(8, 16, 24, 32, 40, 48, 56, 64),
             runs={
                 "one row pressed": functools.partial(_columns, "one row"),

@@ -97,14 +97,19 @@ SHEETS = {
 }
 
 
-def needs_table() -> str:
-    rows = [["16x16 unless said", "precharge", "settle", "release", "project rows", "columns", "without precharge"]]
+SHOWN = [list(SHEETS)[number] for number in (0, 2, 7)]
+"""Sheets that the page shows."""
+
+
+def needs_table() -> writer.Table:
+    rows = []
     for name, (size, circuit) in SHEETS.items():
         needs = needed(circuit, size, size)
         times = (needs.precharge, needs.settle, needs.release, needs.project, needs.project_columns)
         marks = "" if not problems(circuit, size, size, projects=True) else " (cannot work)"
         rows.append([name + marks, *map(_us, times), _us(needs.pulled_release)])
-    return writer.table_of(rows)
+    head = ("16x16 unless said", "precharge", "settle", "release", "project rows", "columns", "without precharge")
+    return writer.Table(head, rows, lambda row: row[0] in SHOWN)
 
 
 def _us(time: Time) -> str:
@@ -117,30 +122,6 @@ def compared() -> tuple[SpiceComparison, ...]:
     return tuple(map(agreement.compared, agreement.cases()))
 
 
-def agreement_table() -> str:
-    rows = [["phase", "sheet", "pattern", "pF: line, crossing, neighbor", "Ω: drive, switch, column, row", "diode"]]
-    rows[0] += ["ours, ns", "ngspice, ns", "off by"]
-    for one in compared():
-        circuit, network = one.case.circuit, one.case.phase.network
-        rows.append(
-            [
-                one.case.phase.name,
-                f"{network.rows}x{network.columns}",
-                one.case.pattern,
-                f"{circuit.line_pf:g}, {circuit.crossing_pf:g}, {circuit.neighbor_pf:g}",
-                ", ".join(
-                    f"{ohms:,.3g}" if ohms < 1000 else f"{ohms / 1000:.3g}k"
-                    for ohms in (circuit.drive_ohm, circuit.switch_ohm, circuit.column_pull_ohm, circuit.row_pull_ohm)
-                ),
-                "silicon" if circuit.diode == SILICON else "Schottky",
-                f"{1e9 * one.ours_s:,.4g}",
-                f"{1e9 * one.spice_s:,.4g}",
-                f"{100 * one.error:+.2f} %",
-            ]
-        )
-    return writer.table_of(rows)
-
-
 def summary_table() -> str:
     rows = [["phase", "circuits", "largest difference"]]
     for name in agreement.PHASES:
@@ -150,8 +131,9 @@ def summary_table() -> str:
     return writer.table_of(rows)
 
 
-def breaks_table() -> str:
-    rows = [["knob", "circuit", "holds until", "breaks at", "what breaks", "what helps"]]
+def breaks_table() -> writer.Table:
+    """The page shows the first circuit of each knob."""
+    rows = []
     for name, knob in breaks.KNOBS.items():
         for number, (run, sweep) in enumerate(breaks.sweeps(name).items()):
             last, first = sweep.holds_until, sweep.breaks_at
@@ -165,7 +147,8 @@ def breaks_table() -> str:
                     knob.helps if not number else "",
                 ]
             )
-    return writer.table_of(rows)
+    head = ("knob", "circuit", "holds until", "breaks at", "what breaks", "what helps")
+    return writer.Table(head, rows, lambda row: row[0], (head[0], *head[2:4], head[5]))
 
 
 def shorted_table() -> str:

@@ -12,14 +12,15 @@ from contactfpga.skin.several import Several
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.apps import size
+from contactfpga_sim.lab import writer
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.trace import Trace
 from contactfpga_sim.model.scenes.scene import scene
 
 SKIN = Skin(row_drive="74hc595", column_read="74hc165")
-COUNTS = (1, 2, 3, 4, 8)
+COUNTS = (1, 2, 4, 8)
 BAUDS = (3_000_000, 12_000_000)
 SECONDS = 0.05
 

@@ -13,7 +13,8 @@ from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.apps import size
+from contactfpga_sim.lab import writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 FAST = Path("examples/fast.toml")
@@ -26,6 +27,8 @@ FAULTS: dict[str, dict[str, Any]] = {
     "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
     "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
 }
+CHEAP = ("`fail_safe`", "`alive`", "`row_order` and `column_order`")
+"""Options that the page leaves out."""
 FAST_FAULTS: dict[str, dict[str, Any]] = {
     "`guard`": {"guard": True},
     "`self_test`": {"self_test": True},
@@ -57,9 +60,9 @@ def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
 
 
-def faults_table() -> str:
+def faults_table() -> writer.Table:
     rows = [*_fault_rows(Skin(), "none", FAULTS), *_fault_rows(Skin.load(FAST), f"`{FAST}`", FAST_FAULTS)]
-    return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
+    return writer.Table(("option", "LUT4", "more"), rows, lambda row: row[0] not in CHEAP)
 
 
 def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list[tuple[str, str, str]]:

@@ -5,17 +5,16 @@ A placement shifts the scene by up to a pitch along both axes, and its frames by
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab import kept, pool
-from contactfpga_sim.lab.failures import rated
+from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
 from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_of
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
@@ -29,79 +28,27 @@ Ids = list[list[int]]
 
 Made = tuple[Zones, ...]
 
-Rates = list[tuple[float, rated.Rate]]
+
+def rated(
+    name: str, scene: Callable[[float, Random], Made], right: Callable[[Ids, float], bool], method: Callable[[], Update]
+) -> Rated:
+    """A method over random placements: whether its ids are those of the contacts."""
+
+    def draws(value: float, rng: Random, count: int) -> list[Outcome]:
+        return [Outcome(right(_ids(method(), scene(value, rng)), value)) for _ in range(count)]
+
+    return Rated(draws, zlib.crc32(name.encode()))
 
 
-@dataclasses.dataclass(frozen=True)
-class Knob:
-    name: str
-    title: str
-    axis: str
-    """The moved quantity, with its unit."""
-    values: tuple[float, ...]
-    scene: Callable[[float, Random], Made]
-    """Frames for a value, at a random placement."""
-    right: Callable[[Ids, float], bool]
-    """Whether the ids are those of the contacts."""
-    methods: Mapping[str, Callable[[], Update]]
-    closed: Mapping[str, str]
-    """Break points by formula, by method."""
-    helps: str
-
-    def rates(self, value: float, methods: Iterable[str], seed: int = 0) -> dict[str, rated.Rate]:
-        """Correct placements at a value, the same for each method; as many as decide it. Undecided ones break."""
-        hits = dict.fromkeys(methods, 0)
-        found: dict[str, rated.Rate] = {}
-        for number in range(rated.LOOKS[-1]):
-            frames = self.scene(value, np.random.default_rng([zlib.crc32(self.name.encode()), seed, number]))
-            for method in hits.keys() - found.keys():
-                hits[method] += self.right(_ids(self.methods[method](), frames), value)
-                rate = rated.Rate(hits[method], number + 1)
-                if rate.of == rated.LOOKS[-1] or (rate.of in rated.LOOKS and rate.reaches(rated.LEVEL) is not None):
-                    found[method] = rate
-            if len(found) == len(hits):
-                break
-        return found
-
-    def sweep(self, seed: int = 0) -> dict[str, Rates]:
-        """Rates by method, value by value until too few are correct."""
-        found: dict[str, Rates] = {method: [] for method in self.methods}
-        for value in self.values:
-            whole = [method for method, rates in found.items() if not rates or holds(rates[-1][1])]
-            for method, rate in self.rates(value, whole, seed).items() if whole else ():
-                found[method].append((value, rate))
-        return found
-
-
-def holds(rate: rated.Rate) -> bool:
-    return bool(rate.reaches(rated.LEVEL))
-
-
-def held_until(rates: Rates) -> float | None:
-    """Last value up to which enough are correct, or None."""
-    held = [value for value, rate in rates if holds(rate)]
-    return held[-1] if held else None
-
-
-@functools.cache
-def sweep(name: str, seed: int = 0) -> dict[str, Rates]:
-    """:meth:`Knob.sweep` of this knob, cached."""
-    key = repr((kept.made_by(__name__), name, seed))
-
-    def new() -> dict[str, list[tuple[float, int, int]]]:
-        found = KNOBS[name].sweep(seed)
-        return {method: [(value, rate.right, rate.of) for value, rate in rates] for method, rates in found.items()}
-
-    plain = kept.kept("breaks", key, new)
-    return {method: [(value, rated.Rate(right, of)) for value, right, of in rates] for method, rates in plain.items()}
-
-
-def sweeps() -> dict[str, dict[str, Rates]]:
-    with pool.executor() as workers, pool.progress() as step:
-        for one in [workers.submit(sweep, name) for name in KNOBS]:
-            one.result()
-            step("breaks", len(KNOBS))
-    return {name: sweep(name) for name in KNOBS}
+def _knob(
+    name: str,
+    scene: Callable[[float, Random], Made],
+    right: Callable[[Ids, float], bool],
+    methods: Mapping[str, Callable[[], Update]],
+    **more: Any,
+) -> Knob:
+    """A knob with a rate of each method, all on the same placements."""
+    return Knob(name=name, runs={title: rated(name, scene, right, make) for title, make in methods.items()}, **more)
 
 
 def _moved(rng: Random) -> tuple[float, float]:
@@ -153,7 +100,7 @@ def _slide(step_mm: float, rng: Random, from_rest: bool) -> Made:
 
 
 SPEEDING, AT_ONCE = (
-    Knob(
+    _knob(
         name=name,
         title=f"A finger that slides, {how}",
         axis="mm per frame",
@@ -165,15 +112,12 @@ SPEEDING, AT_ONCE = (
         helps="more frames per second, a larger `gate_mm`: at 1,000 frames per second 20 mm per frame are 20 m/s",
     )
     for name, how, from_rest, closed in (
-        ("slide", "speeding up over ten frames", True, {"nearest zone": "20: no barycenter goes beyond the gate"}),
+        ("slide", "speeding up over ten frames", True, {"nearest zone": 20.0}),  # no barycenter goes beyond the gate
         (
             "slide at once",
             "at full speed at once",
             False,
-            {
-                "`Tracker`": "20: the first barycenter does not go beyond the gate",
-                "nearest zone": "20: none goes beyond it",
-            },
+            {"`Tracker`": 20.0, "nearest zone": 20.0},  # the first does not go beyond it, and none does
         ),
     )
 )
@@ -188,7 +132,7 @@ def _pair(distance_mm: float, rng: Random) -> Made:
     return _frames(now, both[0] | both[1])
 
 
-MEET = Knob(
+MEET = _knob(
     name="meet",
     title="Two fingers of 16 mm that meet and part, at 250 frames per second",
     axis="distance of their middles, mm",
@@ -196,7 +140,7 @@ MEET = Knob(
     scene=_pair,
     right=lambda ids, _: ids[0] == ids[-1],
     methods=METHODS,
-    closed={"nearest zone": "24.8: a column between their cells"},
+    closed={"nearest zone": 24.8},  # a column between their cells
     helps="a finer pitch keeps their zones apart for longer",
 )
 
@@ -209,7 +153,7 @@ def _lanes(gap_mm: float, rng: Random) -> Made:
     return _frames(now, both[0] | both[1])
 
 
-CROSS = Knob(
+CROSS = _knob(
     name="cross",
     title="Two fingers of 16 mm that pass each other at 1 m/s each",
     axis="distance of their lanes, mm",
@@ -217,7 +161,7 @@ CROSS = Knob(
     scene=_lanes,
     right=lambda ids, _: ids[0] == ids[-1][::-1],
     methods=METHODS,
-    closed={"nearest zone": "25.3: a row between their cells"},
+    closed={"nearest zone": 25.3},  # a row between their cells
     helps="head on, only how long they share a zone tells passing from going back",
 )
 
@@ -238,7 +182,7 @@ def _holding(hold_ms: float) -> Update:
     return update
 
 
-BOUNCE = Knob(
+BOUNCE = _knob(
     name="bounce",
     title="A contact that bounces, at 2,000 frames per second",
     axis="time for which it is open, ms",
@@ -250,11 +194,8 @@ BOUNCE = Knob(
         "`Tracker`, `hold_ms = 20`": lambda: _holding(20.0),
         "nearest zone": _nearest,
     },
-    closed={
-        "`Tracker`, `hold_ms = 5`": "4.5: the hold less a frame",
-        "`Tracker`, `hold_ms = 20`": "19.5: the hold less a frame",
-        "nearest zone": "0: any frame that does not show it",
-    },
+    # The hold less a frame; for the nearest zone any frame that does not show the contact.
+    closed={"`Tracker`, `hold_ms = 5`": 4.5, "`Tracker`, `hold_ms = 20`": 19.5, "nearest zone": 0.0},
     helps="`hold_ms` above the bounce; each `up` comes as much later. The board's `debounce` costs less",
 )
 
@@ -271,7 +212,7 @@ def _slides_over(ids: Ids, count: float) -> bool:
     return ids[-1][-1] == ids[0][0] and len({name for one in ids for name in one}) == count + 1
 
 
-STUCK = Knob(
+STUCK = _knob(
     name="stuck",
     title="A finger that slides over stuck switches, at 125 frames per second",
     axis="how many are stuck",
@@ -279,7 +220,6 @@ STUCK = Knob(
     scene=_stuck,
     right=_slides_over,
     methods=METHODS,
-    closed={},
     helps="a stuck switch is a contact that never ends: list it in `mask`",
 )
 
@@ -292,7 +232,7 @@ def _gap(ms: float, rng: Random) -> Made:
     return _frames(now.tolist(), under(30 + x_mm + 500 * now, Y_MM + y_mm))
 
 
-LOST = Knob(
+LOST = _knob(
     name="lost",
     title="A finger that slides at 500 mm/s while frames are lost, at 500 frames per second",
     axis="ms from a frame to the next",
@@ -300,10 +240,8 @@ LOST = Knob(
     scene=_gap,
     right=_one_id,
     methods=METHODS,
-    closed={
-        "`Tracker`": "80.5: the barycenter is within the gate of where the filter puts it after 50 ms",
-        "nearest zone": "40.3: it is within the gate of the one before",
-    },
+    # The barycenter is within the gate of where the filter puts it after 50 ms, or of the one before.
+    closed={"`Tracker`": 80.5, "nearest zone": 40.3},
     helps="a larger `gate_mm`; `board.stats.lost` counts lost frames",
 )
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga import picture_style as style
-from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.performance.scans import RECORDINGS
+from contactfpga_sim.lab import knobs, writer
+from contactfpga_sim.lab.knobs import Knob, Sweep
 from contactfpga_sim.lab.speed.driver import frame, greeting
 from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
 
@@ -48,10 +48,9 @@ def _round(chunks: list[bytes]) -> FrameRates:
 
     def decode() -> None:
         for chunk in chunks:
-            for event in host.receive(chunk, 0.0):
-                if isinstance(event, Arrival):
-                    event.zones[0]  # its places, which are computed when they are asked for
-                    arrived.append(event.zones)
+            for zones in frames_in(host.receive(chunk, 0.0)):
+                zones[0]  # its places, which are computed when they are asked for
+                arrived.append(zones)
 
     tracker = Tracker()
     decoded = _rate(decode, len(chunks))
@@ -66,7 +65,8 @@ def _rate(work: Callable[[], object], count: int) -> float:
     return count / (time.process_time() - started)
 
 
-HEAD = ("tracker", "MOTA, %", "IDF1, %", "id switches per 1,000 frames")
+MEAN = "mean of all"
+RECORDINGS = Path("../shared/data")
 LOOKS = {
     "`Tracker`": (style.BLUE, "solid"),
     "nearest zone": (style.VERMILLION, style.DASHES[1]),
@@ -75,16 +75,16 @@ LOOKS = {
 }
 
 
-def scores_table() -> str:
+def scores_table() -> writer.Table:
     found = scores.all_scenes()
     heads = tuple(f"{name}: IDF1, %" for name in scores.TRACKERS)
-    rows = [("scenes", "frames per second", *heads, "`Tracker`: MOTA, %", "id switches per 1,000 frames")]
-    rows += [_scores(family, rate, one) for (family, rate), one in found.items()]
+    head = ("scenes", "frames per second", *heads, "`Tracker`: MOTA, %", "id switches per 1,000 frames")
+    rows = [_scores(family, rate, one) for (family, rate), one in found.items()]
     for rate in scores.RATES_HZ:
         each = [one for (_, other), one in found.items() if other == rate]
         means = (f"**{sum(100 * one[name].idf1 for one in each) / len(each):.1f}**" for name in scores.TRACKERS)
-        rows.append(("mean of all", f"{rate:,g}", *means, "", ""))
-    return writer.table_of(rows)
+        rows.append((MEAN, f"{rate:,g}", *means, "", ""))
+    return writer.Table(head, rows, lambda row: row[0] == MEAN, head[:-2])
 
 
 def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
@@ -93,45 +93,49 @@ def _scores(family: str, rate: float, found: scores.Scores) -> tuple[str, ...]:
     return f"`{family}`", f"{rate:,g}", *each, f"{100 * ours.mota:.1f}", f"{ours.switches_per_1000:.1f}"
 
 
-def ahead_table() -> str:
+def ahead_table() -> writer.Table:
     names = [name for name in scores.TRACKERS if name != "`Tracker`"]
-    rows = [("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))]
+    rows = []
     for (family, rate), found in scores.all_scenes().items():
         gained = [scores.ahead(found["`Tracker`"], found[name]) for name in names]
         if rate in scores.JUDGED_RATES:
             rows.append((f"`{family}`", f"{rate:,g}", *(f"{100 * one:.1f} ± {100 * half:.1f}" for one, half in gained)))
-    return writer.table_of(rows)
+    head = ("scenes", "frames per second", *(f"ahead of {name}, %" for name in names))
+    return writer.Table(head, rows, lambda row: row[1] == f"{scores.JUDGED_RATES[0]:g}")
 
 
-def recorded_table() -> str:
-    rows = [("recording", "frames taken", *HEAD)]
+def recorded_table() -> writer.Table:
+    rows = []
     for path in sorted(RECORDINGS.glob("*.npz")):
         for every in scores.EVERY:
-            for number, (tracker, score) in enumerate(scores.of_recording(path, every).items()):
-                taken = "all" if every == 1 else f"one of {every}"
-                first = (path.name.partition(".")[0], taken) if number == 0 else ("", "")
-                rows.append((*first, tracker, *score.cells))
-    return writer.table_of(rows)
+            found = scores.of_recording(path, every).values()
+            taken = "all" if every == 1 else f"one of {every}"
+            rows.append((path.name.partition(".")[0], taken, *(f"{100 * one.idf1:.1f}" for one in found)))
+    head = ("recording", "frames taken", *(f"{name}: IDF1, %" for name in scores.TRACKERS))
+    return writer.Table(head, rows, lambda row: row[1] == "all")
 
 
 BREAKS = ("knob", "method", "right in 95 % up to", "right there", "right at the next", "closed form", "what helps")
 
 
-def breaks_table() -> str:
-    found = breaks.sweeps()
-    return writer.table_of([BREAKS, *(row for name in found for row in break_rows(breaks.KNOBS[name], found[name]))])
+def breaks_table() -> writer.Table:
+    """The page shows the first method of each knob."""
+    swept = knobs.sweeps(breaks.__name__)
+    rows = [row for name, methods in swept.items() for row in break_rows(breaks.KNOBS[name], methods)]
+    return writer.Table(BREAKS, rows, lambda row: row[0], (BREAKS[0], BREAKS[2], BREAKS[6]))
 
 
-def break_rows(knob: breaks.Knob, found: Mapping[str, breaks.Rates]) -> Iterator[tuple[str, ...]]:
+def break_rows(knob: Knob, found: Mapping[str, Sweep]) -> Iterator[tuple[str, ...]]:
     """A knob's lines; common cells are only in the first."""
-    for number, (method, rates) in enumerate(found.items()):
-        held = [(value, rate) for value, rate in rates if breaks.holds(rate)]
-        until, there = (f"**{held[-1][0]:g}**", str(held[-1][1])) if held else ("nowhere", "")
-        if len(held) == len(rates):
-            until += ", all there are"
-        after = f"{rates[-1][0]:g}: {rates[-1][1]}" if len(held) < len(rates) else ""
+    for number, (method, sweep) in enumerate(found.items()):
+        held = len(sweep.values) if sweep.broken is None else sweep.broken
+        until = f"**{sweep.values[held - 1]:g}**" if held else "nowhere"
+        until += ", all there are" if sweep.broken is None else ""
+        there = sweep.outcomes[held - 1].rate if held else ""
+        after = "" if sweep.broken is None else f"{sweep.breaks_at:g}: {sweep.outcomes[sweep.broken].rate}"
+        closed = f"{knob.closed[method]:g}" if method in knob.closed else ""
         first = (f"{knob.title}: {knob.axis}", knob.helps) if number == 0 else ("", "")
-        yield first[0], method, until, there, after, knob.closed.get(method, ""), first[1]
+        yield first[0], method, until, there, after, closed, first[1]
 
 
 def speed_table() -> str:

@@ -8,9 +8,10 @@ from contactfpga.wire.units import plain_bytes
 from contactfpga_sim.lab import writer
 
 COUNTS = 1, 3, 6, 8
+SHOWN = 6
 
 
-def units_table() -> str:
+def units_table() -> writer.Table:
     head = (
         "converter",
         "units",
@@ -24,7 +25,8 @@ def units_table() -> str:
     )
     rows = [_row(Skin(units=count, converter_v=supply_v)) for supply_v in (3.3, 5.0) for count in COUNTS]
     rows += [_row(Skin(units=count, converter="ads131m08")) for count in COUNTS[1:]]
-    return writer.table(head, map(writer.line, rows))
+    columns = ("converter", "supply", "sweep", "packet", "at 3 Mbaud", "at 12 Mbaud")
+    return writer.Table(head, rows, lambda row: row[1] == str(SHOWN), columns)
 
 
 def _row(skin: Skin) -> tuple[str, ...]:

@@ -99,9 +99,6 @@ class Visitor:
         """Drag from first to last place and hold; the button stays down."""
         self._drag([self.place(*place) for place in places], hold_ms)
 
-    def drag_in_space(self, *points_m: np.ndarray, hold_ms: int = 300) -> None:
-        self._drag([self._seen(point) for point in points_m], hold_ms)
-
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
         self.page.mouse.move(*self._pixel(shares[0]))
         self.page.wait_for_function(OVER)

@@ -31,9 +31,10 @@ MAX_LAG_S = 0.02
 """Largest lag of simulated time that is caught up; what is beyond it stays."""
 
 SLIP_LIMIT = 0.05
-"""Share of real time lost in :data:`SLIP_WINDOW_S` above which a report is due."""
+"""Share of real time lost in the last seconds above which a report is due."""
 
 SLIP_WINDOW_S = 5.0
+"""Seconds between two looks at the share."""
 
 HEADROOM = 0.9
 """Recommended clock as a share of the measured speed."""
@@ -149,7 +150,7 @@ class PtyBoard:
     def _run(self) -> None:
         cycles = max(1, round(CHUNK_S * self.skins[0].clock_hz))
         pace = Pace(self._board.clock(), most_lag_s=MAX_LAG_S)
-        window, window_slip = time.monotonic(), self.slip
+        looked_s = time.monotonic()
         while not self._stopping:
             ahead = pace.wait_s(self._board.clock())
             self.slip = pace.slip_s
@@ -158,9 +159,9 @@ class PtyBoard:
                 continue  # woken by a client before it is time
             self._board.advance(cycles)
             self._speak(self._board.read(0))
-            if (passed := time.monotonic() - window) > SLIP_WINDOW_S:
-                self._report_slip((self.slip - window_slip) / passed)
-                window, window_slip = time.monotonic(), self.slip
+            if time.monotonic() - looked_s > SLIP_WINDOW_S:
+                self._report_slip(1 - pace.share)
+                looked_s = time.monotonic()
 
     def _report_slip(self, share: float) -> None:
         if share > SLIP_LIMIT and not self._slip_told:

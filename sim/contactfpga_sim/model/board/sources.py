@@ -59,10 +59,11 @@ def own(files: Iterable[Path]) -> str:
     return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
 
 
-def files(modules: Iterable[str], scripts: Iterable[Path] = ()) -> set[Path]:
-    """Project files that modules and scripts reach: imports, and data in folders beside them."""
-    folders = _folders(PACKAGES) | _beside(scripts)
-    found = {file for file in _closure({*modules, *map(_name, scripts)}, folders).values() if file}
+def files(modules: Iterable[str]) -> set[Path]:
+    """Files that modules reach in the project and in their own packages: imports, and data in folders beside them."""
+    modules = set(modules)
+    folders = _folders({*PACKAGES, *(module.partition(".")[0] for module in modules)})
+    found = {file for file in _closure(modules, folders).values() if file}
     return found | {data for folder in {file.parent for file in found} for data in _data(folder)}
 
 

@@ -30,7 +30,7 @@ def add_flags(flag: flags.Flags) -> None:
     flag("--places N", places, numbers.whole(0, 10_000))
     flag("--skin FILE", "Skin of the sheet (default: the reference Skin).")
     flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
-    flag("--charts", "Draw force and thickness against latency instead.")
+    flag("--charts", "Draw force against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
     flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
@@ -82,8 +82,8 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
 
 
 def _anywhere(args: argparse.Namespace, case: Case, skin: Skin, count: int) -> anywhere.Found:
+    from contactfpga_sim.apps.pool import executor, progress
     from contactfpga_sim.lab.arm import anywhere, places
-    from contactfpga_sim.lab.pool import executor, progress
 
     places.check(case)
     ways = anywhere.ways(case, skin, 1e-6 * args.latency_us)
@@ -137,8 +137,8 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
 
 
 def _charts(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga_sim.apps.pool import executor, progress
     from contactfpga_sim.lab.arm import pictures, sweep
-    from contactfpga_sim.lab.pool import executor, progress
 
     pictures.check(case)
     folder = outputs.folder(args.output)

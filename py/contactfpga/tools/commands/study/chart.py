@@ -29,8 +29,8 @@ def add_flags(flag: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from contactfpga_sim.lab import pool
-    from contactfpga_sim.lab.chart import beside, host, picture, times_picture
+    from contactfpga_sim.apps import pool
+    from contactfpga_sim.lab.chart import host, picture, times_picture
     from contactfpga_sim.lab.chart import numbers as table
     from contactfpga_sim.lab.chart.compute import study
     from contactfpga_sim.lab.chart.methods import Method
@@ -40,15 +40,14 @@ def run(args: argparse.Namespace) -> int:
     so_far: dict[Task, Point] = {}
     try:
         with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-            points = beside.bounded(study(tasks, executor, not args.no_size, step, so_far), executor)
+            points = study(tasks, executor, not args.no_size, step, so_far)
     except KeyboardInterrupt:
         raise Interruption(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
     path = folder / "chart.csv"
     table.write(map(host.timed, points), path)
     print(path, flush=True)
     points = table.read(path, {task.method: Method(task.skin, task.cover) for task in tasks})
-    families = list(dict.fromkeys(task.family for task in tasks))
-    picture.save(points, folder, beside.rivals(families, min(args.placements, beside.TOUCHES), args.seed))
+    picture.save(points, folder)
     times_picture.save(points, folder / "times.svg")
     for name in ("chart.png", "chart.svg", "times.svg"):
         print(folder / name)

@@ -1,0 +1,1 @@
+"""What users run beside the board: fit, latency, MuJoCo, and what these share with the studies."""

@@ -1,0 +1,1 @@
+"""The cheapest Skin that meets limits of errors and time on given scenes."""

@@ -1,0 +1,85 @@
+"""Covers to try, and how well a fingertip is felt through one."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from contactfpga.design.cover import Cells, Cover, CoverError, Ellipse, Load, cells_of
+from contactfpga_sim.apps import covers
+
+KINDS = ("caps", "tiles")
+"""Keys of :data:`contactfpga_sim.apps.covers.COVERS` that work with any switch."""
+
+DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
+
+Faces = dict[str, Callable[[float], Cover | None]]
+"""Covers by name, as functions of pitch in mm; None: no cover."""
+
+BARE: Faces = {"bare": covers.bare}
+
+
+def faces(kinds: Sequence[str] = KINDS, domes_n: Sequence[float] = DOMES_N, foam_mm: float = 2.0) -> Faces:
+    """Each kind; caps and tiles with each switch, under foam of this thickness."""
+    found: Faces = {}
+    for kind in kinds:
+        if kind not in KINDS:
+            found[kind] = covers.COVERS[kind]
+            continue
+        for force_n in domes_n:
+            found[f"{kind}, {force_n:g} N"] = functools.partial(_on_domes, kind, force_n, foam_mm)
+    return found
+
+
+def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cover:
+    make = {"caps": covers.capped, "tiles": covers.tiled}[kind]
+    cover = make(pitch_mm, dataclasses.replace(covers.DOME, force_n=force_n))
+    return dataclasses.replace(cover, thickness_m=foam_mm * 1e-3)
+
+
+def own(cover: Cover) -> Faces:
+    return {"the file's": lambda pitch_mm: cover}
+
+
+def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
+    """Why switches at this pitch do not fit the cover, or empty."""
+    if cover is None or cover.model == "patch":
+        return ""
+    try:
+        Cells(cover, 1, 1, pitch_mm[0] * 1e-3, pitch_mm[1] * 1e-3)
+    except CoverError as error:
+        return str(error)
+    return ""
+
+
+def feels(cover: Cover | None) -> bool:
+    """Whether the cover depends on force."""
+    return cover is not None and cover.model != "patch"
+
+
+TOUCHES = 8
+
+FINGERTIP_M = (12e-3, 10e-3)
+
+LINES = 9
+"""Sides of the sheet; touches are on its middle cell."""
+
+
+def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> list[float]:
+    """1 for each of the :data:`TOUCHES` of each number in which a fingertip with ``force_n``, randomly placed and
+    turned, closes no switch, else 0. Closing forces are drawn for each."""
+    pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
+    cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
+    found = []
+    for touch in (number * TOUCHES + each for number in numbers for each in range(TOUCHES)):
+        rng = np.random.default_rng([touch, LINES])
+        across, down = LINES // 2 + rng.uniform(-0.5, 0.5, 2)
+        length, width = (size / 2 for size in FINGERTIP_M)
+        tip = Ellipse(length, width, across * pitch_x, down * pitch_y, rng.uniform(0, math.pi))
+        closed = cells.forces_n([Load((tip,), force_n)]) >= cells.drawn(int(rng.integers(1 << 32)))
+        found.append(float(not closed.any()))
+    return found

@@ -1,1 +1,0 @@
-"""Needs of the C header on microcontrollers."""
