@@ -1,6 +1,6 @@
 """Forces within friction's cones that exert a wrench, and the range of each push under the units' noise.
 
-Forces are those of least squares if they lie in the cones, else those of a cone program (Clarabel, loaded on demand).
+Forces are those of least squares if they lie in the cones, else those of a cone program.
 
 A range covers all forces within the cones whose misfit, in squares of noise with uncertain places, exceeds its minimum
 by at most 3.84, the 95 % quantile of chi-square with one degree of freedom (profile likelihood: Meeker and Escobar, The
@@ -13,14 +13,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contactfpga.errors import MissingExtra
 from contactfpga.robot.haptics.contact import Interval
-from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.robot.haptics.program import Program
 from contactfpga.surfaces.shapes import Floats
 
 CHI2_1 = 3.841458820694124
@@ -28,7 +26,7 @@ CHI2_1 = 3.841458820694124
 KNOWN = 1e-9
 """Share below which a singular value, or an effect of the null space, is 0."""
 
-FEW_COUNT, MANY_COUNT = 1e-7, 1e-2
+FEW_COUNT, MANY_COUNT = 1e-7, 0.03
 """Weights of a squared push against a squared force along the surface, among forces with the same wrench, for up to two
 contacts and for more, which else squeeze the link hard to drag a little less."""
 
@@ -38,8 +36,14 @@ ROUNDING = 1e-12
 UNBOUNDED = 500.0
 """Push, in multiples of the measured force, that counts as unbounded."""
 
-TOLERANCE = 1e-10
-"""Relative tolerance of Clarabel."""
+LARGEST = 1e3
+"""Mean push, in multiples of the measured force, up to which programs search."""
+
+SMALLEST = 1e-9
+"""Weight of the squared forces against their squared misfit, where both count."""
+
+FOUND = 1e-6
+"""Error of a cone program up to which it has forces that exert the wrench."""
 
 
 class _Space:
@@ -87,6 +91,8 @@ class Cones:
     def __init__(self, matrix: Floats, wanted: Floats, frictions: Sequence[float]):
         self._matrix, self._wanted, self._frictions = matrix, wanted, np.array(frictions)
         self._used = _used(self._frictions)
+        sides = np.where(self._frictions > 0, self._frictions, 1.0)
+        self._scales = np.stack([np.ones(len(sides)), sides, sides], axis=1).ravel()
         self._space = _Space(matrix, self._used)
         self.rank = len(self._space.values)
 
@@ -142,17 +148,44 @@ class Cones:
 
     def _nearest(self) -> Floats:
         """The forces in the cones nearest to the wrench."""
-        matrix, wanted = self._matrix / self._space.values[0], self._wanted / self._space.values[0]
-        size = max(1.0 / float(self._space.values[0]), float(np.linalg.norm(wanted)))
-        found = _Program(self._frictions, size).least(matrix.T @ matrix, -wanted @ matrix)
-        if found is None:
-            raise HapticsError("no forces within friction's cones were found; do contacts lie in one point?")
+        space, shares = self._space, self._wanted @ self._space.left
+        length = float(np.linalg.norm(shares)) or 1.0
+        square = SMALLEST * _weights(len(self._frictions))
+        rows = space.values[:, None] * space.right / space.values[0]
+        found, _ = self._least(rows, shares / length, length / float(space.values[0]), 1.0, square)
         return found
 
     def _smallest(self, shares: Floats) -> Floats | None:
         """The forces in the cones with these shares and the smallest parts along the surface; None without any."""
-        program = _Program(self._frictions, float(np.abs(shares).max()), same=(self._space.right, shares))
-        return program.least(np.diag(_weights(len(self._frictions))), np.zeros(len(self._used)))
+        size = float(np.abs(shares).max()) or 1.0
+        found, error = self._least(self._space.right, shares / size, size, 0.0, _weights(len(self._frictions)))
+        return found if error < FOUND else None
+
+    def _least(self, rows: Floats, wanted: Floats, size_n: float, rest: float, square: Floats) -> tuple[Floats, float]:
+        """The (3k,) forces with the least square forces^2, and their error. ``rest`` is 1 if what they miss of
+        ``wanted`` counts as well, or 0 if they miss nothing."""
+        program = self._program(rows, wanted, size_n, 2.0 * rest, square)
+        found, errors = program.least(np.zeros((1, *program.shape)))
+        return size_n * self._scales * found[0, : len(self._frictions), :3].ravel(), float(errors[0])
+
+    def _program(
+        self, rows: Floats, wanted: Floats, size_n: float, most: float, square: Floats | None = None
+    ) -> Program:
+        """Forces over ``size_n`` in their cones, ``rows`` forces that miss ``wanted`` by at most ``most``, and a bound
+        of the sum of all pushes.
+
+        Cones of contacts have sides over friction. The last two are that of the rest, and what is left to the bound.
+        """
+        count, rank = len(self._frictions), len(rows)
+        columns, squares = np.zeros((count + 2, max(3, rank + 1), rank + 2)), None
+        columns[:count, :3, :rank] = (rows * self._scales).T.reshape(count, 3, rank)
+        columns[:count, 0, -1], columns[-1, 0, -1], columns[-2, 0, -2] = 1 / (LARGEST * count), 1.0, 1.0
+        if most:
+            columns[-2, 1 : rank + 1, :rank] = most * np.eye(rank)
+        if square is not None:
+            squares = np.zeros(columns.shape[:2])
+            squares[:count, :3], squares[-2, 1:] = (square * self._scales**2).reshape(count, 3), most**2
+        return Program(columns, np.array([*wanted, 1.0, 1.0]), squares)
 
     def ranges(self, forces: Floats, frictions: Sequence[float], beyond: bool, exact: bool) -> list[Interval]:
         """Least and largest of each push; None if unbounded.
@@ -167,8 +200,10 @@ class Cones:
         cones = self._of_any_friction(wanted) if beyond else Cones(self._matrix, wanted, frictions)
         if cones is None:
             return [(0.0, None)] * len(self._frictions)
-        ends = functools.cache(lambda: cones._ends(forces, exact))
-        return [cones._determined(at, exact) or ends().of(3 * at) for at in range(len(frictions))]
+        known = [cones._determined(at, exact) for at in range(len(frictions))]
+        asked = [at for at, one in enumerate(known) if one is None]
+        found = iter(cones._ends(asked, forces, exact) if asked else ())
+        return [next(found) if one is None else one for one in known]
 
     def _of_any_friction(self, wanted: Floats) -> Cones | None:
         """The pushes alone, for the wrenches that parts along the surface do not exert; None if these exert all."""
@@ -191,81 +226,20 @@ class Cones:
             return (float(row @ best),) * 2 if exact else None
         return float(ends[0][3 * at]), float(ends[1][3 * at])
 
-    def _ends(self, forces: Floats, exact: bool) -> _Program:
-        """What finds the ranges of pushes that the wrench alone does not determine."""
-        felt = np.linalg.norm(self._matrix[:, ::3], axis=0)
+    def _ends(self, asked: Sequence[int], forces: Floats, exact: bool) -> list[Interval]:
+        """The ranges of pushes that the wrench alone does not determine."""
+        space, felt = self._space, np.linalg.norm(self._matrix[:, ::3], axis=0)
         size = max(float(forces[::3].max()), 1 / float(felt[felt > KNOWN * felt.max()].min()))
         if exact:
-            return _Program(self._frictions, size, same=(self._space.right, self._space.right @ forces))
-        most = math.sqrt(self.misfit(self._nearest()) + CHI2_1)
-        return _Program(self._frictions, size, near=(self._matrix, self._wanted, most))
-
-
-class _Program:
-    """Forces (3k,) in cones, near ``size_n``. ``same`` is a matrix with its product, ``near`` one with the product's
-    target and the largest distance from it.
-
-    The problem is so sparse that 64 contacts need no longer each than three.
-    """
-
-    def __init__(
-        self,
-        frictions: Floats,
-        size_n: float,
-        same: tuple[Floats, Floats] | None = None,
-        near: tuple[Floats, Floats, float] | None = None,
-    ):
-        try:
-            import clarabel
-            from scipy import sparse
-        except ModuleNotFoundError:
-            raise MissingExtra("The forces at two contacts or more", "haptics") from None
-        self._clarabel, self._sparse = clarabel, sparse
-        self._size, self._used = size_n, _used(frictions)
-        count = int(self._used.sum())
-        scales = np.stack([np.where(frictions > 0, frictions, 1.0), *np.ones((2, len(frictions)))], axis=1).ravel()
-        sides, starts = [-sparse.diags(scales[self._used])], [np.zeros(count)]
-        self._cones: list[Any] = [
-            clarabel.SecondOrderConeT(3) if friction else clarabel.NonnegativeConeT(1) for friction in frictions
-        ]
-        if same is not None:
-            sides.append(sparse.csc_matrix(same[0][:, self._used]))
-            starts.append(same[1] / size_n)
-            self._cones.append(clarabel.ZeroConeT(len(same[1])))
-        if near is not None:
-            matrix, target, most = near
-            sides += [sparse.csc_matrix((1, count)), sparse.csc_matrix(size_n * matrix[:, self._used])]
-            starts += [np.array([most]), target]
-            self._cones.append(clarabel.SecondOrderConeT(1 + len(target)))
-        self._sides = sparse.vstack(sides, format="csc")
-        self._start = np.concatenate(starts)
-
-    def of(self, at: int) -> Interval:
-        """The least and the largest force ``at``; None if unbounded."""
-        ends = []
-        for sign in (1.0, -1.0):
-            slope = np.zeros(len(self._used))
-            slope[at] = sign
-            solution = self._run(np.zeros((len(slope),) * 2), slope)
-            status = str(solution.status)
-            if "Solved" not in status and "DualInfeasible" not in status:
-                raise HapticsError(f"the interval of a push was not found ({status}); do contacts lie in one point?")
-            ends.append(sign * float(solution.obj_val) if "Solved" in status else math.inf)
-        return self._size * ends[0], None if ends[1] > UNBOUNDED else self._size * ends[1]
-
-    def least(self, square: Floats, slope: Floats) -> Floats | None:
-        """The forces x with the least x' square x / 2 + slope x; None if none are found."""
-        solution = self._run(square, slope / self._size)
-        if "Solved" not in str(solution.status):
-            return None
-        found = np.zeros(len(self._used))
-        found[self._used] = solution.x
-        return self._size * found
-
-    def _run(self, square: Floats, slope: Floats) -> Any:
-        settings = self._clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-        square = self._sparse.csc_matrix(np.triu(square[np.ix_(self._used, self._used)]))
-        given = (square, slope[self._used], self._sides, self._start, self._cones, settings)
-        return self._clarabel.DefaultSolver(*given).solve()
+            program = self._program(space.right, space.right @ forces / size, size, 0.0)
+        else:
+            shares = self._wanted @ space.left
+            best = space.values * (space.right @ self._nearest()) - shares
+            most = math.sqrt(float(best @ best) + CHI2_1)
+            rows = size / most * space.values[:, None] * space.right
+            program = self._program(rows, shares / most, size, 1.0)
+        slopes = np.zeros((2 * len(asked), *program.shape))
+        for number, at in enumerate(asked):
+            slopes[2 * number, at, 0], slopes[2 * number + 1, at, 0] = 1.0, -1.0
+        ends = (slopes * program.least(slopes)[0]).sum(axis=(1, 2)).reshape(-1, 2).tolist()
+        return [(size * low, None if -high > UNBOUNDED else -size * high) for low, high in ends]

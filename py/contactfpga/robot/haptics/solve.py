@@ -1,8 +1,4 @@
-"""From a wrench and touched places to contacts, by the simplest sufficient model.
-
-One and two contacts are solved in plain Python, faster than numpy for a few numbers. The wrench is corrected to the
-nearest that they can exert: a force has no moment about its point, two have none about their line.
-"""
+"""From a wrench and touched places to contacts, by the simplest sufficient model."""
 
 from __future__ import annotations
 
@@ -11,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.robot.haptics.cones import Cones
+from contactfpga.robot.haptics.cones import KNOWN, Cones
 from contactfpga.robot.haptics.contact import (
     FULL_WRENCH,
     PURE_FORCE,
@@ -24,7 +20,7 @@ from contactfpga.robot.haptics.contact import (
     Touch,
 )
 from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, skew
-from contactfpga.robot.haptics.wrench import ALARM, Surface, Wrench
+from contactfpga.robot.haptics.wrench import ALARM, Noise, Surface, Wrench
 from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
@@ -47,8 +43,7 @@ def contacts(
     Forces lie within friction's cones and have the smallest parts along the surface that exert the wrench; where
     friction does not allow for it (:attr:`Contacts.beyond_friction`), they are of any size. Three contacts or more have
     pushes along the normals if these suffice, and all contacts if units do not see all six components of the wrench, or
-    friction is 0. Two contacts or more may need the extra `haptics`. Without a zone there is the center of pressure on
-    ``surface``.
+    friction is 0. Without a zone there is the center of pressure on ``surface``.
 
     Args:
         cones: forces within friction's cones also where pushes along the normals suffice.
@@ -81,11 +76,14 @@ def _chosen(wrench: Wrench, touches: Sequence[Touch], cones: bool) -> Solution:
     sees_all = wrench.noise is None or wrench.noise.rank == 6
     if not sees_all or not any(touch.friction for touch in touches):
         return _Frame(wrench, touches, known=True).solution()
+    closed = _one(wrench, touches[0]) if len(touches) == 1 else _two(wrench, touches) if len(touches) == 2 else None
+    if closed is not None:
+        return closed
     if len(touches) > 2 and not cones:
         pushes = _Frame(wrench, touches, known=True)
         if pushes.suffice:
             return pushes.solution()
-    return _Frame(wrench, touches, known=False).solution()
+    return _Frame(wrench, touches).solution()
 
 
 def _nothing(wrench: Wrench) -> Solution:
@@ -137,44 +135,131 @@ def distinct(touches: Sequence[Touch]) -> None:
                 raise HapticsError(f"contacts {first} and {last} both lie at {one.point_m}; give one of them")
 
 
+AXES: tuple[Vector, ...] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def _one(wrench: Wrench, touch: Touch) -> Solution | None:
+    """The closed form of one contact, of any friction; None if it pulls."""
+    force, _, chi2 = _without_moment(wrench, AXES, touch.point_m, [(touch.point_sigma_m, wrench.force_n)])
+    push = -dot(touch.normal, force)
+    beyond = not _within(touch, force, push)
+    return None if push < 0 else _closed(wrench, [touch], [force], [], chi2, beyond)
+
+
+def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution | None:
+    """The closed form of two contacts, at the squeeze with the smallest parts along the surface; None if that lies
+    beyond friction."""
+    (ax, ay, az), (bx, by, bz) = (touch.point_m for touch in touches)
+    length = math.dist(touches[0].point_m, touches[1].point_m)
+    along = (ax - bx) / length, (ay - by) / length, (az - bz) / length
+    middle = (ax + bx) / 2, (ay + by) / 2, (az + bz) / 2
+    split = _split(wrench.force_n, wrench.moment_nm, middle, along, length)
+    moved = [(touch.point_sigma_m, force) for touch, force in zip(touches, split)]
+    force, moment, chi2 = _without_moment(wrench, (along,), middle, moved)
+    forces, curve, slope = _split(force, moment, middle, along, length), 0.0, 0.0
+    for touch, one, sign in zip(touches, forces, (1, -1)):
+        more = sign * dot(touch.normal, along)
+        curve += 1 - more * more
+        slope += sign * dot(one, along) - dot(touch.normal, one) * more
+    if curve < KNOWN:
+        return None
+    forces = [_plus(one, sign * slope / curve, along) for one, sign in zip(forces, (-1, 1))]
+    if not all(_within(touch, one, -dot(touch.normal, one)) for touch, one in zip(touches, forces)):
+        return None
+    half = math.sqrt(0.5)
+    null = [[*(half * one for one in along), *(-half * one for one in along)]]
+    return _closed(wrench, touches, forces, null, chi2, False)
+
+
+def _without_moment(
+    wrench: Wrench, axes: Sequence[Vector], point: Vector, moved: Sequence[tuple[float, Vector]]
+) -> tuple[Vector, Vector, float | None]:
+    """Force and moment nearest to the wrench's that have no moment about one or three axes through a point, and their
+    distance in squares of noise, to which uncertain places of these forces add."""
+    force, moment = wrench.force_n, wrench.moment_nm
+    if wrench.noise is None:
+        return force, moment, None
+    sides = [cross(point, axis) + axis for axis in axes]
+    rests = [dot(side, force) + dot(axis, moment) for side, axis in zip(sides, axes)]
+    both = np.array(sides) @ wrench.noise.covariance
+    turns = np.array([[sigma * part for sigma, one in moved for part in cross(axis, one)] for axis in axes])
+    spread = (both @ np.array(sides).T + turns @ turns.T).tolist()
+    if len(axes) == 1:
+        shares = [rests[0] / spread[0][0]]
+    else:
+        first, second, third = spread
+        inverse = cross(second, third), cross(third, first), cross(first, second)
+        shares = [dot(row, rests) / dot(first, inverse[0]) for row in inverse]
+    fx, fy, fz, mx, my, mz = (np.array(shares) @ both).tolist()
+    force = force[0] - fx, force[1] - fy, force[2] - fz
+    return force, (moment[0] - mx, moment[1] - my, moment[2] - mz), sum(a * b for a, b in zip(rests, shares))
+
+
+def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> list[Vector]:
+    """Two forces without squeeze: half of the sum each, plus a couple about the middle."""
+    couple = cross(_plus(moment, -1.0, cross(middle, force)), along)
+    half = force[0] / 2, force[1] / 2, force[2] / 2
+    return [_plus(half, 1 / length, couple), _plus(half, -1 / length, couple)]
+
+
+def _plus(first: Vector, share: float, second: Vector) -> Vector:
+    return first[0] + share * second[0], first[1] + share * second[1], first[2] + share * second[2]
+
+
+def _within(touch: Touch, force: Vector, push: float) -> bool:
+    sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
+    return push >= 0 and sideways <= touch.friction * push + KNOWN * (push + 1)
+
+
+def _closed(
+    wrench: Wrench,
+    touches: Sequence[Touch],
+    forces: list[Vector],
+    null: list[list[float]],
+    chi2: float | None,
+    beyond: bool,
+) -> Solution:
+    rank = 3 if len(touches) == 1 else 5
+    intervals, covariance = (lambda: _Frame(wrench, touches).intervals()), (lambda: _Frame(wrench, touches).covariance())
+    return Solution(PURE_FORCE, forces, intervals, rank, null, chi2, 6 - rank, touches, wrench, covariance, beyond)
+
+
 class _Frame:
     """Forces at the contacts of one frame that explain its wrench.
 
     ``known``: all are along the normals.
     """
 
-    def __init__(self, wrench: Wrench, touches: Sequence[Touch], known: bool):
+    def __init__(self, wrench: Wrench, touches: Sequence[Touch], known: bool = False):
         self._wrench, self._touches, self._known = wrench, touches, known
         self._axes = [_axes(touch.normal) for touch in touches]
         columns = [(*axis, *cross(touch.point_m, axis)) for touch, axes in zip(touches, self._axes) for axis in axes]
         self._matrix = np.array(columns).T  # (6, 3k)
         self._frictions = [0.0 if known else touch.friction for touch in touches]
-        noise = wrench.noise
-        unsure = noise is not None and any(touch.point_sigma_m for touch in touches)
-        self._forces: list[Vector] = [wrench.force_n]  # that of one contact, whose place widens the moment
-        if not unsure or len(touches) > 1 or known:
-            self._solve(_exact(wrench, touches) if noise is None else noise.root)
-        if noise is not None and unsure:
-            self._solve(noise.widened(self._moved()).root)
-
-    def _solve(self, root: Floats) -> None:
-        self._cones = Cones(root @ self._matrix, root @ self._wrench.array, self._frictions)
+        root = _exact(wrench, touches) if wrench.noise is None else self._widened(wrench.noise).root
+        self._cones = Cones(root @ self._matrix, root @ wrench.array, self._frictions)
         self._sizes, self._beyond = self._cones.nearest()
-        self._forces = [
+        self._forces = self._turned(self._sizes)
+
+    def _widened(self, noise: Noise) -> Noise:
+        """The noise with that of uncertain places, at the smallest forces that fit."""
+        if not any(touch.point_sigma_m for touch in self._touches):
+            return noise
+        matrix = np.where(np.arange(self._matrix.shape[1]) % 3 * self._known, 0.0, noise.root @ self._matrix)
+        sizes = np.linalg.lstsq(matrix, noise.root @ self._wrench.array, rcond=KNOWN)[0]
+        turns = [touch.point_sigma_m * skew(force) for touch, force in zip(self._touches, self._turned(sizes))]
+        return noise.widened(np.asarray(sum(turn @ turn.T for turn in turns)))
+
+    def _turned(self, sizes: Floats) -> list[Vector]:
+        """Forces in the link's frame."""
+        return [
             (
                 a * first[0] + b * second[0] + c * third[0],
                 a * first[1] + b * second[1] + c * third[1],
                 a * first[2] + b * second[2] + c * third[2],
             )
-            for (first, second, third), (a, b, c) in zip(self._axes, self._sizes.reshape(-1, 3).tolist())
+            for (first, second, third), (a, b, c) in zip(self._axes, sizes.reshape(-1, 3).tolist())
         ]
-
-    def _moved(self) -> Floats:
-        """(3, 3) covariance of the moment by uncertain places."""
-        more = np.zeros((3, 3))
-        for touch, force in zip(self._touches, np.array(self._forces)):
-            more += touch.point_sigma_m**2 * (float(force @ force) * np.eye(3) - force[:, None] * force)
-        return more
 
     @property
     def _freedom(self) -> int:
@@ -188,31 +273,32 @@ class _Frame:
             return off <= (SMALL / EXACT) ** 2
         return self._freedom == 0 or off <= ALARM[self._freedom - 1]
 
-    def solution(self) -> Solution:
-        noise, cones = self._wrench.noise, self._cones
-        basis = np.zeros((3 * len(self._touches), 3 * len(self._touches)))
-        for number, axes in enumerate(self._axes):
-            basis[3 * number : 3 * number + 3, 3 * number : 3 * number + 3] = np.array(axes).T
+    def intervals(self) -> list[Interval]:
+        noise = self._wrench.noise
         sees_all = noise is None or noise.rank == 6
         frictions = [touch.friction if sees_all else 0.0 for touch in self._touches]
-        null = cones.null[:, ::3] if self._known else cones.null @ basis.T
+        ranges = self._cones.ranges(self._sizes, frictions, self._beyond, noise is None)
+        pushes = [-dot(touch.normal, force) for touch, force in zip(self._touches, self._forces)]
+        return [
+            (max(0.0, min(push, low)), None if high is None else max(0.0, push, high))
+            for push, (low, high) in zip(pushes, ranges)
+        ]
 
-        def covariance() -> Floats | None:
-            root = basis @ cones.root
-            return None if noise is None else root @ root.T
+    def _in_link(self, forces: Floats) -> Floats:
+        """(n, 3k) forces from the contacts' axes to the link's frame."""
+        return (np.array(self._axes).transpose(0, 2, 1) @ forces.reshape(-1, len(self._axes), 3, 1)).reshape(forces.shape)
 
-        def intervals() -> list[Interval]:
-            ranges = cones.ranges(self._sizes, frictions, self._beyond, noise is None)
-            pushes = [-dot(touch.normal, force) for touch, force in zip(self._touches, self._forces)]
-            return [
-                (max(0.0, min(push, low)), None if high is None else max(0.0, push, high))
-                for push, (low, high) in zip(pushes, ranges)
-            ]
+    def covariance(self) -> Floats | None:
+        root = self._in_link(self._cones.root.T)
+        return None if self._wrench.noise is None else root.T @ root
 
+    def solution(self) -> Solution:
+        cones = self._cones
+        null = cones.null[:, ::3] if self._known else self._in_link(cones.null)
         model = PURE_FORCE_WITH_KNOWN_DIRECTION if self._known else PURE_FORCE
-        chi2 = None if noise is None else cones.misfit(self._sizes)
-        given = (self._touches, self._wrench, covariance, self._beyond)
-        return Solution(model, self._forces, intervals, cones.rank, null.tolist(), chi2, self._freedom, *given)
+        chi2 = None if self._wrench.noise is None else cones.misfit(self._sizes)
+        given = (self._touches, self._wrench, self.covariance, self._beyond)
+        return Solution(model, self._forces, self.intervals, cones.rank, null.tolist(), chi2, self._freedom, *given)
 
 
 def _exact(wrench: Wrench, touches: Sequence[Touch]) -> Floats:
