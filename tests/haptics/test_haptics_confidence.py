@@ -1,14 +1,14 @@
 """Intervals of pushes with the units' noise: how often they hold the true push, by contacts, wrenches and noise that
-the test draws itself; the ends against a search, and for one contact on one unit against the closed
-form."""
+the test draws itself; the ends against Clarabel, and for one contact on one unit against the closed form."""
 
 import dataclasses
 import math
 
+import clarabel
 import numpy as np
 import pytest
 from bumpers import exerted, hexapod, in_cone, scattered, touch, units, wrench
-from scipy.optimize import minimize
+from scipy import sparse
 
 from contactfpga.robot.haptics import HapticsError, LoadCells, calibrate, contacts
 from contactfpga.robot.haptics.calibrate import PER_UNIT
@@ -62,46 +62,52 @@ def test_one_contact_on_one_unit_is_the_reading_and_its_noise(sigma_n):
     assert lifted.interval_n == pytest.approx((0.0, sigma_n * (math.hypot(0.5, Z) - 0.5)), abs=1e-3 * sigma_n)
 
 
-def searched_ends(points, normals, forces, six, covariance, free):
-    """Least and largest push of each contact by a search from the true forces: of forces in friction's cones (``free``:
-    of any friction) whose misfit exceeds its least by 3.84."""
+def programmed(points, normals, six, covariance, free):
+    """Least and largest push of each contact by Clarabel, None where there is no largest one: of forces in friction's
+    cones (``free``: of any friction) whose misfit exceeds its least by 3.84."""
     count, weigh = len(points), np.linalg.inv(np.linalg.cholesky(covariance))
     matrix = weigh @ np.hstack([np.vstack([np.eye(3), np.cross(p, np.eye(3)).T]) for p in points])
+    pushes = [-np.ravel(np.eye(count)[at][:, None] * normals) for at in range(count)]
+    rows, cones = [], []
+    for normal, push, at in zip(normals, pushes, np.eye(count)):
+        sides = np.kron(at, np.eye(3) - np.outer(normal, normal))
+        rows += [push[None]] if free else [MU * push[None], sides]
+        cones.append(clarabel.NonnegativeConeT(1) if free else clarabel.SecondOrderConeT(4))
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = False, 1e-10, 1e-10, 1e-10
 
-    def room(x):
-        pushes = -(x.reshape(-1, 3) * normals).sum(axis=1)
-        sides = (x**2).reshape(-1, 3).sum(axis=1) - pushes**2
-        return np.concatenate([pushes, [] if free else MU**2 * pushes**2 - sides])
+    def least(square, slope, rows, start, cones):
+        sides = sparse.csc_matrix(-np.vstack(rows))
+        given = sparse.csc_matrix(np.triu(square)), slope, sides, start, cones, settings
+        return clarabel.DefaultSolver(*given).solve()
 
-    def misfit(x):
-        return ((matrix @ x - weigh @ six) ** 2).sum()
-
-    cones, how = {"type": "ineq", "fun": room}, {"method": "SLSQP", "options": {"maxiter": 500, "ftol": 1e-10}}
-    best = minimize(misfit, np.ravel(forces), constraints=[cones], **how)
-    near = {"type": "ineq", "fun": lambda x: best.fun + Z**2 - misfit(x)}
-    slopes = [sign * np.ravel(np.eye(count)[at][:, None] * -normals) for at in range(count) for sign in (1, -1)]
-    found = [
-        minimize(lambda x, s=s: s @ x, best.x, jac=lambda x, s=s: s, constraints=[cones, near], **how) for s in slopes
-    ]
-    return [(low.fun, -high.fun) for low, high in zip(found[::2], found[1::2])]
+    start, target = np.zeros(sum(map(len, rows))), weigh @ six
+    best = matrix @ least(matrix.T @ matrix, -target @ matrix, rows, start, cones).x - target
+    near = [*rows, np.zeros((1, 3 * count)), -matrix]
+    start = [*start, math.sqrt(best @ best + Z**2), *target]
+    cones = [*cones, clarabel.SecondOrderConeT(7)]
+    found = [least(np.zeros((3 * count,) * 2), sign * push, near, start, cones) for push in pushes for sign in (1, -1)]
+    ends = [None if "DualInfeasible" in str(one.status) else one.obj_val for one in found]
+    return [(low, None if high is None else -high) for low, high in zip(ends[::2], ends[1::2])]
 
 
-@pytest.mark.parametrize("drag", [0.5, 1.0])
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_the_ends_are_those_of_a_search(count, drag):
+@pytest.mark.parametrize("drag", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_the_ends_are_those_of_clarabel(count, drag):
     rng = np.random.default_rng([count, 3])
     noise = hexapod(60).noise
     root = np.linalg.cholesky(noise.covariance)
-    for _ in range(6):
+    for _ in range(12):
         points, normals, forces = drawn(rng, count, drag, "cylinder")
         six = exerted(points, forces).array + root @ rng.standard_normal(6)
-        found = contacts(wrench(six, noise), [touch(p, n, MU) for p, n in zip(points, normals)])
-        expected = searched_ends(points, normals, forces, six, noise.covariance, found.beyond_friction)
+        found = contacts(wrench(six, noise), [touch(p, n, MU) for p, n in zip(points, normals)], cones=True)
+        expected = programmed(points, normals, six, noise.covariance, found.beyond_friction)
+        size = max(one.normal_n for one in found)
         for one, (least, largest) in zip(found, expected):
             low, high = one.interval_n
-            assert low == pytest.approx(max(0.0, least), abs=0.01)
-            assert high is None or high == pytest.approx(largest, rel=1e-3, abs=0.01)
-            assert high is not None or largest > 100
+            assert low == pytest.approx(max(0.0, least), rel=1e-6, abs=1e-6 * size)
+            assert high is None or high == pytest.approx(largest, rel=1e-6, abs=1e-6 * size)
+            assert high is not None or largest is None or largest > 500 * size
 
 
 @pytest.mark.parametrize(

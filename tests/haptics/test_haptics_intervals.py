@@ -1,13 +1,14 @@
 """How far each push may vary, against linear programs and brute force, which share no code with it."""
 
+import sys
+
 import numpy as np
 import pytest
-from bumpers import exerted, in_cone, scattered, solved
+from bumpers import exerted, hexapod, in_cone, scattered, solved
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from contactfpga.errors import MissingExtra
 from contactfpga.robot.haptics.contact import PURE_FORCE_WITH_KNOWN_DIRECTION
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -70,7 +71,6 @@ def lies_between(interval, outer, inner, close):
 @example(seed=1143701, friction=0.5)  # 0.05 % of friction change this interval by 0.5 %
 @settings(max_examples=8, deadline=None)
 def test_intervals_are_those_of_linear_programs(count, cones, close, seed, friction):
-    pytest.importorskip("clarabel", reason="extra haptics")
     rng = np.random.default_rng(seed)
     points, normals = scattered(rng, count)
     share = 0.6 if count > 2 else 1.0
@@ -90,7 +90,7 @@ def test_intervals_are_those_of_linear_programs(count, cones, close, seed, frict
 
 @pytest.mark.parametrize("friction", [0.0, 0.5, 2.0])
 def test_three_zones_on_a_plane_have_exact_pushes(friction):
-    """At any friction, with scipy alone."""
+    """At any friction."""
     points = np.array([[0.05, 0, 0.01], [-0.03, 0.04, 0.01], [-0.02, -0.05, 0.01]])
     normals = np.tile([0, 0, 1.0], (3, 1))
     pushes = np.array([3.0, 8.0, 5.0])
@@ -101,11 +101,13 @@ def test_three_zones_on_a_plane_have_exact_pushes(friction):
         assert one.interval_n == pytest.approx((push, push))
 
 
-def test_without_the_solvers_the_extra_is_named(monkeypatch):
-    points, normals = scattered(np.random.default_rng(0), 4)
-    found = solved(points, normals, exerted(points, -5 * normals))
-    monkeypatch.setitem(__import__("sys").modules, "clarabel", None)
-    with pytest.raises(MissingExtra, match=r"\[haptics\]"):
-        found[0].interval_n  # noqa: B018
-    alone = solved(points[:1], normals[:1], exerted(points[0], -5 * normals[0]))
-    assert alone[0].interval_n == pytest.approx((5, 5))
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_forces_and_intervals_need_numpy_alone(monkeypatch, count):
+    """With noise, at friction's limit."""
+    for library in ("clarabel", "scipy"):
+        monkeypatch.setitem(sys.modules, library, None)
+    rng = np.random.default_rng(0)
+    points, normals = scattered(rng, count)
+    forces = [in_cone(rng, normal, MU, 5) for normal in normals]
+    found = solved(points, normals, exerted(points, forces, hexapod(60, 0.075).noise), cones=True)
+    assert all(one.interval_n[0] <= 5.2 for one in found)

@@ -5,14 +5,13 @@ import timeit
 
 import numpy as np
 import pytest
-from bumpers import exerted, hexapod, scattered, solved
+from bumpers import exerted, hexapod, scattered
 
 from contactfpga.robot.haptics import contacts
 from contactfpga.robot.haptics.contact import Touch
 from contactfpga.robot.haptics.wrench import Wrench
 from contactfpga.tools.commands.haptics.reading import MAX_CONTACTS
 
-pytest.importorskip("clarabel")
 ROUNDING_N = 1e-12
 
 
@@ -29,13 +28,24 @@ def scene(rng, count, around_m, friction, sideways=0.0):
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_a_frame_takes_no_longer_than_some_small_solves(count):
-    """At most 0.3 ms where numpy solves six equations in 6.7 us, with as much again for a busy machine."""
+def test_a_frame_takes_no_longer_than_a_few_small_solves(count):
+    """Readings to contacts, with places that are unsure.
+
+    At most 50 us where numpy solves six equations in 6.7 us, with as much again for a busy machine: an idle one takes
+    7.5 solves for one contact and 9.5 for two. A round has one after the other, so that a busy machine slows them
+    alike.
+    """
+    cells, six = hexapod(60, 0.075), np.random.default_rng(1).random((6, 6))
     points, normals = scattered(np.random.default_rng(1), count)
-    loaded, six = exerted(points, -9 * normals, hexapod(60, 0.075).noise), np.random.default_rng(1).random((6, 6))
-    works = (lambda: solved(points, normals, loaded), lambda: np.linalg.solve(six, six[0]))
-    takes, solve = (min(timeit.repeat(work, timer=time.thread_time, repeat=20, number=100)) for work in works)
-    assert takes / solve < 2 * 300 / 6.7
+    readings = np.linalg.solve(cells.matrix, exerted(points, -9 * normals).array)
+    pairs = [(tuple(p.tolist()), tuple(n.tolist())) for p, n in zip(points, normals)]
+    works = (
+        lambda: contacts(cells.wrench(readings), [Touch(*pair, 0.5, 0.002) for pair in pairs]),
+        lambda: np.linalg.solve(six, six[0]),
+    )
+    rounds = [[timeit.timeit(work, timer=time.thread_time, number=150) for work in works] for _ in range(25)]
+    takes, solve = np.min(rounds, axis=0)
+    assert takes / solve < 2 * 50 / 6.7
 
 
 @pytest.mark.parametrize("sideways", [0.0, 0.3])

@@ -10,7 +10,6 @@ standard deviations to either side.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from contactfpga.robot.haptics.contact import Interval
 from contactfpga.robot.haptics.program import Program
+from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.surfaces.shapes import Floats
 
 CHI2_1 = 3.841458820694124
@@ -45,6 +45,9 @@ SMALLEST = 1e-9
 FOUND = 1e-6
 """Error of a cone program up to which it has forces that exert the wrench."""
 
+USABLE = 1e-4
+"""Error of a cone program, as a share of the result, up to which there is a result."""
+
 
 class _Space:
     """The forces that a matrix to the wrench tells apart, and those without wrench."""
@@ -66,6 +69,11 @@ class _Space:
             return np.asarray(shares @ self.right)
         weighted = self.right / _weights(self.right.shape[1] // 3)
         return np.asarray(np.linalg.solve(weighted @ self.right.T, shares) @ weighted)
+
+
+def _check(error: float) -> None:
+    if not error < USABLE:
+        raise HapticsError(f"pushes are known to {error:.2g} of their size only; do contacts lie in one point?")
 
 
 def _used(frictions: Floats) -> NDArray[np.bool_]:
@@ -113,7 +121,8 @@ class Cones:
 
     def nearest(self) -> tuple[Floats, bool]:
         """The forces within the cones nearest to the wrench, of equal ones those with the smallest parts along the
-        surface; and False. Where friction is not enough: those of any friction at the contacts that push; and True."""
+        surface; and False. Where friction is not enough: True, and those of any friction if they fit significantly
+        better."""
         shares = self._wanted @ self._space.left
         forces = self._least_squares()
         square = float(self._wanted @ self._wanted)
@@ -123,14 +132,17 @@ class Cones:
         if not worse and self._allowed(forces):
             return forces, False
         found = self._smallest(shares / self._space.values) if len(self.null) else None
-        return (forces, True) if found is None else (found, False)
+        if found is not None:
+            return found, False
+        found = self._nearest()
+        return (found if self.misfit(found) < self.misfit(forces) + CHI2_1 else forces), True
 
     def _least_squares(self) -> Floats:
         """Forces of least squares, without the contacts that would pull."""
         pushing, space = np.ones(len(self._used), bool), self._space
         while True:
             forces = space.smallest(self._wanted @ space.left / space.values)
-            pulls = np.repeat(forces[::3] < 0, 3)
+            pulls = np.repeat(forces[::3] < min(0.0, forces[::3].min() / 2), 3)
             if not pulls.any():
                 return forces
             pushing &= ~pulls
@@ -152,7 +164,8 @@ class Cones:
         length = float(np.linalg.norm(shares)) or 1.0
         square = SMALLEST * _weights(len(self._frictions))
         rows = space.values[:, None] * space.right / space.values[0]
-        found, _ = self._least(rows, shares / length, length / float(space.values[0]), 1.0, square)
+        found, error = self._least(rows, shares / length, length / float(space.values[0]), 1.0, square)
+        _check(error)
         return found
 
     def _smallest(self, shares: Floats) -> Floats | None:
@@ -165,7 +178,7 @@ class Cones:
         """The (3k,) forces with the least square forces^2, and their error. ``rest`` is 1 if what they miss of
         ``wanted`` counts as well, or 0 if they miss nothing."""
         program = self._program(rows, wanted, size_n, 2.0 * rest, square)
-        found, errors = program.least(np.zeros((1, *program.shape)))
+        found, _, errors = program.least(np.zeros((1, *program.shape)))
         return size_n * self._scales * found[0, : len(self._frictions), :3].ravel(), float(errors[0])
 
     def _program(
@@ -241,5 +254,8 @@ class Cones:
         slopes = np.zeros((2 * len(asked), *program.shape))
         for number, at in enumerate(asked):
             slopes[2 * number, at, 0], slopes[2 * number + 1, at, 0] = 1.0, -1.0
-        ends = (slopes * program.least(slopes)[0]).sum(axis=(1, 2)).reshape(-1, 2).tolist()
-        return [(size * low, None if -high > UNBOUNDED else -size * high) for low, high in ends]
+        found, gains, errors = program.least(slopes)
+        _check(float(errors.max()))
+        ends = (slopes * found).sum(axis=(1, 2)).reshape(-1, 2).tolist()
+        more = gains[1::2, -1, 0]  # of the largest, per doubled bound
+        return [(size * a, None if -b > UNBOUNDED or c > 1 else -size * b) for (a, b), c in zip(ends, more)]

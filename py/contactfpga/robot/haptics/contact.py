@@ -122,8 +122,7 @@ class Contact:
 
         With the units' noise it contains the push in at least 95 of 100 cases
         (:mod:`contactfpga.robot.haptics.cones`); without (:attr:`Wrench.noise` None) it is the range of all forces
-        that friction allows and that exert exactly this wrench. Raises :class:`~contactfpga.MissingExtra` without
-        Clarabel, which two contacts or more need, and one that nearly lifts or slips.
+        that friction allows and that exert exactly this wrench.
         """
         return None if self._intervals is None else self._intervals()[self._number]
 

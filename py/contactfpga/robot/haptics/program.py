@@ -13,7 +13,7 @@ from contactfpga.surfaces.shapes import Floats
 
 STEPS = 40
 
-ENOUGH = 1e-9
+ENOUGH = 1e-10
 """Error of the equations and of the optimum, relative to the least value and at least 1, at which a program ends."""
 
 LATE = 1e-7
@@ -43,32 +43,34 @@ class Program:
     @property
     def shape(self) -> tuple[int, int]:
         """n and d."""
-        return self._columns.shape[:2]
+        return len(self._columns), len(self._flip)
 
-    def least(self, slopes: Floats) -> tuple[Floats, Floats]:
-        """The x with the least slope x + square x^2 / 2 for each of (m, n, d) slopes, and its (m,) errors."""
+    def least(self, slopes: Floats) -> tuple[Floats, Floats, Floats]:
+        """The x with the least slope x + square x^2 / 2 for each of (m, n, d) slopes; (m, n, d) gains per x that leaves
+        a cone by 1; (m,) errors."""
         with np.errstate(all="ignore"):
             return self._followed(slopes)
 
-    def _followed(self, slopes: Floats) -> tuple[Floats, Floats]:
+    def _followed(self, slopes: Floats) -> tuple[Floats, Floats, Floats]:
         x = np.zeros(slopes.shape)
         x[:, :, 0] = 1.0
         z, y = x.copy(), np.zeros((len(x), len(self._wanted)))
-        best, errors = x, np.full(len(x), np.inf)
+        best, gains, errors = x, z, np.full(len(x), np.inf)
         for _ in range(STEPS):
             off, rest = self._exerted(x) - self._wanted, slopes + self._curved(x) - self._pulled(y) - z
-            gap = (x * z).sum(axis=(1, 2)) / x.shape[1]
+            gap = (x * z).sum(axis=(1, 2)) / len(self._columns)
             error = np.maximum(gap, np.maximum(np.abs(off).max(axis=1), np.abs(rest).max(axis=(1, 2))))
             error = error / (1 + np.abs((slopes * x).sum(axis=(1, 2))))
             better = error < errors
             going = (better | (error > LATE)) & (error > ENOUGH)
-            best, errors = np.where(better[:, None, None], x, best), np.where(better, error, errors)
+            best, gains = (np.where(better[:, None, None], *both) for both in ((x, best), (z, gains)))
+            errors = np.where(better, error, errors)
             if not going.any():
                 break
             dx, dz, dy, share = self._step(x, z, off, rest, gap)
             share = np.where(going & np.isfinite(share), share, 0.0)[:, None, None]
             x, z, y = x + _part(share, dx), z + _part(share, dz), y + _part(share[:, 0], dy)
-        return best, errors
+        return best, gains, errors
 
     def _exerted(self, x: Floats) -> Floats:
         return np.asarray(x.reshape(len(x), -1) @ self._columns.reshape(-1, len(self._wanted)))
@@ -88,8 +90,8 @@ class Program:
         flat = self._columns.reshape(-1, len(self._wanted))
         system = flat.T @ (way @ self._columns).reshape(len(x), *flat.shape)
         over = 1 / np.sqrt(np.diagonal(system, axis1=1, axis2=2))
-        inverse = np.linalg.inv(system * over[:, :, None] * over[:, None] + ROUNDING * np.eye(len(self._wanted)))
-        inverse *= over[:, :, None] * over[:, None]
+        scale = over[:, :, None] * over[:, None]
+        inverse = np.asarray(scale * np.linalg.inv(scale * system + ROUNDING * np.eye(len(self._wanted))), float)
 
         def moved(wanted: Floats) -> tuple[Floats, Floats, Floats]:
             dx, dy = _times(way, _times(back, wanted) - rest), np.zeros(off.shape)

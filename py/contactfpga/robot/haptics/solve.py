@@ -140,7 +140,7 @@ AXES: tuple[Vector, ...] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 def _one(wrench: Wrench, touch: Touch) -> Solution | None:
     """The closed form of one contact, of any friction; None if it pulls."""
-    force, _, chi2 = _without_moment(wrench, AXES, touch.point_m, [(touch.point_sigma_m, wrench.force_n)])
+    force, _, chi2 = _without_moment(wrench, AXES, touch.point_m, [touch], [wrench.force_n])
     push = -dot(touch.normal, force)
     beyond = not _within(touch, force, push)
     return None if push < 0 else _closed(wrench, [touch], [force], [], chi2, beyond)
@@ -154,8 +154,7 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution | None:
     along = (ax - bx) / length, (ay - by) / length, (az - bz) / length
     middle = (ax + bx) / 2, (ay + by) / 2, (az + bz) / 2
     split = _split(wrench.force_n, wrench.moment_nm, middle, along, length)
-    moved = [(touch.point_sigma_m, force) for touch, force in zip(touches, split)]
-    force, moment, chi2 = _without_moment(wrench, (along,), middle, moved)
+    force, moment, chi2 = _without_moment(wrench, (along,), middle, touches, split)
     forces, curve, slope = _split(force, moment, middle, along, length), 0.0, 0.0
     for touch, one, sign in zip(touches, forces, (1, -1)):
         more = sign * dot(touch.normal, along)
@@ -172,27 +171,33 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution | None:
 
 
 def _without_moment(
-    wrench: Wrench, axes: Sequence[Vector], point: Vector, moved: Sequence[tuple[float, Vector]]
+    wrench: Wrench, axes: Sequence[Vector], point: Vector, touches: Sequence[Touch], forces: Sequence[Vector]
 ) -> tuple[Vector, Vector, float | None]:
     """Force and moment nearest to the wrench's that have no moment about one or three axes through a point, and their
-    distance in squares of noise, to which uncertain places of these forces add."""
+    distance in squares of noise, to which the touches' uncertain places add about as with these forces."""
     force, moment = wrench.force_n, wrench.moment_nm
     if wrench.noise is None:
         return force, moment, None
-    sides = [cross(point, axis) + axis for axis in axes]
+    sides: list[tuple[float, ...]] = [cross(point, axis) + axis for axis in axes]
     rests = [dot(side, force) + dot(axis, moment) for side, axis in zip(sides, axes)]
-    both = np.array(sides) @ wrench.noise.covariance
-    turns = np.array([[sigma * part for sigma, one in moved for part in cross(axis, one)] for axis in axes])
-    spread = (both @ np.array(sides).T + turns @ turns.T).tolist()
+    for touch, (x, y, z) in zip(touches, forces):
+        if sigma := touch.point_sigma_m:
+            moved = sigma * x, sigma * y, sigma * z
+            sides = [side + cross(axis, moved) for side, axis in zip(sides, axes)]
+    unsure = np.array(sides)
+    both = unsure.copy()
+    both[:, :6] = unsure[:, :6] @ wrench.noise.covariance
+    spread = (both @ unsure.T).tolist()
     if len(axes) == 1:
         shares = [rests[0] / spread[0][0]]
     else:
         first, second, third = spread
         inverse = cross(second, third), cross(third, first), cross(first, second)
-        shares = [dot(row, rests) / dot(first, inverse[0]) for row in inverse]
-    fx, fy, fz, mx, my, mz = (np.array(shares) @ both).tolist()
-    force = force[0] - fx, force[1] - fy, force[2] - fz
-    return force, (moment[0] - mx, moment[1] - my, moment[2] - mz), sum(a * b for a, b in zip(rests, shares))
+        over = 1 / dot(first, inverse[0])
+        shares = [over * dot(row, rests) for row in inverse]
+    fx, fy, fz, mx, my, mz = (np.array(shares) @ both[:, :6]).tolist()
+    chi2 = sum([rest * share for rest, share in zip(rests, shares)])
+    return (force[0] - fx, force[1] - fy, force[2] - fz), (moment[0] - mx, moment[1] - my, moment[2] - mz), chi2
 
 
 def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> list[Vector]:
@@ -220,7 +225,10 @@ def _closed(
     beyond: bool,
 ) -> Solution:
     rank = 3 if len(touches) == 1 else 5
-    intervals, covariance = (lambda: _Frame(wrench, touches).intervals()), (lambda: _Frame(wrench, touches).covariance())
+    intervals, covariance = (
+        (lambda: _Frame(wrench, touches).intervals()),
+        (lambda: _Frame(wrench, touches).covariance()),
+    )
     return Solution(PURE_FORCE, forces, intervals, rank, null, chi2, 6 - rank, touches, wrench, covariance, beyond)
 
 
@@ -246,7 +254,7 @@ class _Frame:
         if not any(touch.point_sigma_m for touch in self._touches):
             return noise
         matrix = np.where(np.arange(self._matrix.shape[1]) % 3 * self._known, 0.0, noise.root @ self._matrix)
-        sizes = np.linalg.lstsq(matrix, noise.root @ self._wrench.array, rcond=KNOWN)[0]
+        sizes = np.asarray(np.linalg.lstsq(matrix, noise.root @ self._wrench.array, rcond=KNOWN)[0], float)
         turns = [touch.point_sigma_m * skew(force) for touch, force in zip(self._touches, self._turned(sizes))]
         return noise.widened(np.asarray(sum(turn @ turn.T for turn in turns)))
 
@@ -286,7 +294,9 @@ class _Frame:
 
     def _in_link(self, forces: Floats) -> Floats:
         """(n, 3k) forces from the contacts' axes to the link's frame."""
-        return (np.array(self._axes).transpose(0, 2, 1) @ forces.reshape(-1, len(self._axes), 3, 1)).reshape(forces.shape)
+        return (np.array(self._axes).transpose(0, 2, 1) @ forces.reshape(-1, len(self._axes), 3, 1)).reshape(
+            forces.shape
+        )
 
     def covariance(self) -> Floats | None:
         root = self._in_link(self._cones.root.T)
