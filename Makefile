@@ -158,24 +158,27 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 @touch $@
 endef
 
-$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+# What an installation is made of; it compiles the reader in C.
+INSTALLED := pyproject.toml pip-constraints.txt hatch_build.py $(wildcard c/*.[ch])
+
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
-$(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+$(VENV)/.stamp-boards: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,boards,downloads about 145 MB unless installed or cached)
 
-$(VENV)/.stamp-chart: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
+$(VENV)/.stamp-chart: $(VENV)/.stamp-venv $(INSTALLED) | compiler
 	$(call install,chart,downloads about 190 MB unless installed or cached)
 
-$(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
+$(VENV)/.stamp-test: $(VENV)/.stamp-venv $(INSTALLED) | compiler
 	$(call install,sim$(,)test,downloads about 180 MB unless installed or cached)
 	@touch $(VENV)/.stamp-sim
 
-$(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+$(VENV)/.stamp-lint: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,cli$(,)lint,downloads about 45 MB unless installed or cached)
 
-$(VENV)/.stamp-release: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+$(VENV)/.stamp-release: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,release,downloads about 500 MB unless installed or cached)
 
-$(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
+$(VENV)/.stamp-docs: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,cli$(,)docs,downloads about 40 MB unless installed or cached)

@@ -118,7 +118,7 @@ STEP = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = "only the tests of what reads a sheet, and every third case of each"
     parser.addoption("--quick", action="store_true", help=text)
-    text = "every third slow or campaign case of each file; three numbers in a row draw all of them"
+    text = "every third case of each test, and of each file's slow or campaign cases; three numbers draw all of them"
     parser.addoption("--third", type=int, metavar="NUMBER", help=text)
     text = "leave out what passed in this run, whose results --junitxml wrote"
     parser.addoption("--passed", type=Path, metavar="FILE", help=text)
@@ -136,7 +136,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
     quick = config.getoption("quick")
     third = 0 if quick else config.getoption("third")
-    kept = items if third is None else _third(items, third, _test_of if quick else _slow_file_of)
+    kept = items if third is None else _third(items, third, _test_of if quick else _test_or_slow_file_of)
     if config.getoption("passed"):
         passed = _passed(config.getoption("passed"))
         kept = [item for item in kept if _result(item.nodeid) not in passed]
@@ -150,9 +150,9 @@ def _test_of(item: pytest.Item) -> str:
     return item.nodeid if item.get_closest_marker("whole") else item.nodeid.partition("[")[0]
 
 
-def _slow_file_of(item: pytest.Item) -> str:
+def _test_or_slow_file_of(item: pytest.Item) -> str:
     slow = any(item.get_closest_marker(name) for name in ("slow", "campaign"))
-    return item.nodeid.partition("::")[0] if slow else item.nodeid
+    return item.nodeid.partition("::")[0] if slow else _test_of(item)
 
 
 def _third(items: list[pytest.Item], number: int, group: Callable[[pytest.Item], str]) -> list[pytest.Item]:

@@ -17,6 +17,7 @@ import pytest
 from fake_board import background, wait_until
 
 import contactfpga
+import hatch_build
 from contactfpga.driver import health, native
 from contactfpga.driver.native_link import NativeLink
 
@@ -191,3 +192,12 @@ def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(b
         with pytest.raises(contactfpga.ReadTimeout):
             host.next(0.01)
         assert host.stats.frames == count + 3
+
+
+def test_a_library_of_older_sources_is_not_used(monkeypatch, tmp_path):
+    (tmp_path / "older.c").write_text("int cfpga_open(void) { return 0; }")
+    command = [*hatch_build.compiler(), "-shared", "-fPIC", "-o", str(tmp_path / "older.so"), str(tmp_path / "older.c")]
+    subprocess.run(command, check=True)
+    monkeypatch.setattr(native, "LIBRARY", tmp_path / "older.so")
+    monkeypatch.setattr(native, "library", lambda: native.Library(native.LIBRARY))
+    assert native.missing().endswith("install the package again")

@@ -157,7 +157,7 @@ def missing() -> str:
         return "it was installed without a C compiler; install one, then the package again"
     try:
         library()
-    except OSError as error:
+    except (OSError, AttributeError) as error:  # or it is of an older c/reader.c
         return f"its library cannot be loaded ({error}); install the package again"
     return ""
 

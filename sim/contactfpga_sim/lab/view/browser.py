@@ -6,7 +6,7 @@ import contextlib
 import shutil
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -90,8 +90,7 @@ class Visitor:
         return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
 
     def click(self, x_mm: float, y_mm: float, link: str = "") -> None:
-        self.page.mouse.move(*self._pixel(self.place(x_mm, y_mm, link)))
-        self.page.wait_for_timeout(100)
+        self._hover(lambda: self.place(x_mm, y_mm, link))
         self.page.mouse.down()
         self.page.mouse.up()
 
@@ -100,12 +99,22 @@ class Visitor:
         self._drag([self.place(*place) for place in places], hold_ms)
 
     def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
-        self.page.mouse.move(*self._pixel(shares[0]))
-        self.page.wait_for_function(OVER)
+        self._hover(lambda: shares[0])
         self.page.mouse.down()
         for one in shares[1:]:
             self.page.mouse.move(*self._pixel(one), steps=8)
             self.page.wait_for_timeout(hold_ms)
+
+    def _hover(self, place: Callable[[], tuple[float, float]]) -> None:
+        """Move the mouse to a place until the page knows; it learns from moves alone, and draws later."""
+        until = time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(OVER):
+            if time.monotonic() > until:
+                raise TimeoutError("the page never knew that the mouse is over something to be clicked")
+            left, top = self._pixel(place())
+            self.page.mouse.move(left + 1, top)
+            self.page.mouse.move(left, top)
+            self.page.wait_for_timeout(100)
 
     def choose(self, before: str, now: str) -> None:
         """Choose in the panel's list that shows ``before``."""
