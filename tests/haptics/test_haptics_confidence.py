@@ -4,11 +4,9 @@ the test draws itself; the ends against Clarabel, and for one contact on one uni
 import dataclasses
 import math
 
-import clarabel
 import numpy as np
 import pytest
-from bumpers import exerted, hexapod, in_cone, scattered, touch, units, wrench
-from scipy import sparse
+from bumpers import exerted, hexapod, in_cone, programmed, scattered, touch, units, wrench
 
 from contactfpga.robot.haptics import HapticsError, LoadCells, calibrate, contacts
 from contactfpga.robot.haptics.calibrate import PER_UNIT
@@ -62,35 +60,6 @@ def test_one_contact_on_one_unit_is_the_reading_and_its_noise(sigma_n):
     assert lifted.interval_n == pytest.approx((0.0, sigma_n * (math.hypot(0.5, Z) - 0.5)), abs=1e-3 * sigma_n)
 
 
-def programmed(points, normals, six, covariance, free):
-    """Least and largest push of each contact by Clarabel, None where there is no largest one: of forces in friction's
-    cones (``free``: of any friction) whose misfit exceeds its least by 3.84."""
-    count, weigh = len(points), np.linalg.inv(np.linalg.cholesky(covariance))
-    matrix = weigh @ np.hstack([np.vstack([np.eye(3), np.cross(p, np.eye(3)).T]) for p in points])
-    pushes = [-np.ravel(np.eye(count)[at][:, None] * normals) for at in range(count)]
-    rows, cones = [], []
-    for normal, push, at in zip(normals, pushes, np.eye(count)):
-        sides = np.kron(at, np.eye(3) - np.outer(normal, normal))
-        rows += [push[None]] if free else [MU * push[None], sides]
-        cones.append(clarabel.NonnegativeConeT(1) if free else clarabel.SecondOrderConeT(4))
-    settings = clarabel.DefaultSettings()
-    settings.verbose, settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = False, 1e-10, 1e-10, 1e-10
-
-    def least(square, slope, rows, start, cones):
-        sides = sparse.csc_matrix(-np.vstack(rows))
-        given = sparse.csc_matrix(np.triu(square)), slope, sides, start, cones, settings
-        return clarabel.DefaultSolver(*given).solve()
-
-    start, target = np.zeros(sum(map(len, rows))), weigh @ six
-    best = matrix @ least(matrix.T @ matrix, -target @ matrix, rows, start, cones).x - target
-    near = [*rows, np.zeros((1, 3 * count)), -matrix]
-    start = [*start, math.sqrt(best @ best + Z**2), *target]
-    cones = [*cones, clarabel.SecondOrderConeT(7)]
-    found = [least(np.zeros((3 * count,) * 2), sign * push, near, start, cones) for push in pushes for sign in (1, -1)]
-    ends = [None if "DualInfeasible" in str(one.status) else one.obj_val for one in found]
-    return [(low, None if high is None else -high) for low, high in zip(ends[::2], ends[1::2])]
-
-
 @pytest.mark.parametrize("drag", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 def test_the_ends_are_those_of_clarabel(count, drag):
@@ -101,7 +70,7 @@ def test_the_ends_are_those_of_clarabel(count, drag):
         points, normals, forces = drawn(rng, count, drag, "cylinder")
         six = exerted(points, forces).array + root @ rng.standard_normal(6)
         found = contacts(wrench(six, noise), [touch(p, n, MU) for p, n in zip(points, normals)], cones=True)
-        expected = programmed(points, normals, six, noise.covariance, found.beyond_friction)
+        expected = programmed(points, normals, wrench(six, noise), None if found.beyond_friction else MU)
         size = max(one.normal_n for one in found)
         for one, (least, largest) in zip(found, expected):
             low, high = one.interval_n

@@ -101,3 +101,37 @@ def scattered(rng, count):
 def solved(points, normals, loaded, friction=0.5, **how):
     """The contacts at these places."""
     return contacts(loaded, [touch(*pair, friction) for pair in zip(points, normals)], **how)
+
+
+def programmed(points, normals, loaded, friction, chi2=3.841458820694124):
+    """Least and largest push of each contact by Clarabel, None where there is no largest one: of forces in friction's
+    cones (None: of any friction) whose misfit exceeds its least by ``chi2``, or is 0 without noise."""
+    import clarabel
+    from scipy import sparse
+
+    count, six = len(points), loaded.array
+    matrix = np.hstack([np.vstack([np.eye(3), np.cross(p, np.eye(3)).T]) for p in points])
+    pushes = [-np.ravel(np.eye(count)[at][:, None] * normals) for at in range(count)]
+    rows, cones = [], []
+    for normal, push, at in zip(normals, pushes, np.eye(count)):
+        sides = np.kron(at, np.eye(3) - np.outer(normal, normal))
+        rows += [push[None]] if friction is None else [friction * push[None], sides]
+        cones.append(clarabel.NonnegativeConeT(1) if friction is None else clarabel.SecondOrderConeT(4))
+    settings, start, none = clarabel.DefaultSettings(), np.zeros(sum(map(len, rows))), np.zeros((3 * count,) * 2)
+    settings.verbose, settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = False, 1e-10, 1e-10, 1e-10
+
+    def least(square, slope):
+        sides = sparse.csc_matrix(-np.vstack(rows))
+        return clarabel.DefaultSolver(sparse.csc_matrix(np.triu(square)), slope, sides, start, cones, settings).solve()
+
+    if loaded.noise is None:
+        rows, start, cones = [*rows, -matrix], [*start, *six], [*cones, clarabel.ZeroConeT(6)]
+    else:
+        weigh = np.linalg.inv(np.linalg.cholesky(loaded.noise.covariance))
+        matrix, six = weigh @ matrix, weigh @ six
+        best = matrix @ least(matrix.T @ matrix, -six @ matrix).x - six
+        rows, cones = [*rows, np.zeros((1, 3 * count)), -matrix], [*cones, clarabel.SecondOrderConeT(7)]
+        start = [*start, np.sqrt(best @ best + chi2), *six]
+    found = [least(none, sign * push) for push in pushes for sign in (1, -1)]
+    ends = [None if "DualInfeasible" in str(one.status) else one.obj_val for one in found]
+    return [(low, None if high is None else -high) for low, high in zip(ends[::2], ends[1::2])]

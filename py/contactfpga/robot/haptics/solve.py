@@ -21,7 +21,7 @@ from contactfpga.robot.haptics.contact import (
 )
 from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, skew
 from contactfpga.robot.haptics.wrench import ALARM, Noise, Surface, Wrench
-from contactfpga.surfaces.shapes import Floats, Vector
+from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
@@ -78,7 +78,10 @@ def _chosen(wrench: Wrench, touches: Sequence[Touch], cones: bool) -> Solution:
         return _Frame(wrench, touches, known=True).solution()
     closed = _one(wrench, touches[0]) if len(touches) == 1 else _two(wrench, touches) if len(touches) == 2 else None
     if closed is not None:
-        return closed
+        forces, null, chi2, beyond = closed
+        rank = 3 if len(touches) == 1 else 5
+        late = (lambda: _Frame(wrench, touches).intervals()), (lambda: _Frame(wrench, touches).covariance())
+        return Solution(PURE_FORCE, forces, late[0], rank, null, chi2, 6 - rank, touches, wrench, late[1], beyond)
     if len(touches) > 2 and not cones:
         pushes = _Frame(wrench, touches, known=True)
         if pushes.suffice:
@@ -135,18 +138,21 @@ def distinct(touches: Sequence[Touch]) -> None:
                 raise HapticsError(f"contacts {first} and {last} both lie at {one.point_m}; give one of them")
 
 
+Closed = tuple[list[Vector], list[list[float]], float | None, bool]
+"""Forces, null space, chi-square, and whether they are beyond friction."""
+
 AXES: tuple[Vector, ...] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-def _one(wrench: Wrench, touch: Touch) -> Solution | None:
+def _one(wrench: Wrench, touch: Touch) -> Closed | None:
     """The closed form of one contact, of any friction; None if it pulls."""
     force, _, chi2 = _without_moment(wrench, AXES, touch.point_m, [touch], [wrench.force_n])
     push = -dot(touch.normal, force)
     beyond = not _within(touch, force, push)
-    return None if push < 0 else _closed(wrench, [touch], [force], [], chi2, beyond)
+    return None if push < 0 else ([force], [], chi2, beyond)
 
 
-def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution | None:
+def _two(wrench: Wrench, touches: Sequence[Touch]) -> Closed | None:
     """The closed form of two contacts, at the squeeze with the smallest parts along the surface; None if that lies
     beyond friction."""
     (ax, ay, az), (bx, by, bz) = (touch.point_m for touch in touches)
@@ -167,7 +173,7 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution | None:
         return None
     half = math.sqrt(0.5)
     null = [[*(half * one for one in along), *(-half * one for one in along)]]
-    return _closed(wrench, touches, forces, null, chi2, False)
+    return forces, null, chi2, False
 
 
 def _without_moment(
@@ -216,22 +222,6 @@ def _within(touch: Touch, force: Vector, push: float) -> bool:
     return push >= 0 and sideways <= touch.friction * push + KNOWN * (push + 1)
 
 
-def _closed(
-    wrench: Wrench,
-    touches: Sequence[Touch],
-    forces: list[Vector],
-    null: list[list[float]],
-    chi2: float | None,
-    beyond: bool,
-) -> Solution:
-    rank = 3 if len(touches) == 1 else 5
-    intervals, covariance = (
-        (lambda: _Frame(wrench, touches).intervals()),
-        (lambda: _Frame(wrench, touches).covariance()),
-    )
-    return Solution(PURE_FORCE, forces, intervals, rank, null, chi2, 6 - rank, touches, wrench, covariance, beyond)
-
-
 class _Frame:
     """Forces at the contacts of one frame that explain its wrench.
 
@@ -260,14 +250,7 @@ class _Frame:
 
     def _turned(self, sizes: Floats) -> list[Vector]:
         """Forces in the link's frame."""
-        return [
-            (
-                a * first[0] + b * second[0] + c * third[0],
-                a * first[1] + b * second[1] + c * third[1],
-                a * first[2] + b * second[2] + c * third[2],
-            )
-            for (first, second, third), (a, b, c) in zip(self._axes, sizes.reshape(-1, 3).tolist())
-        ]
+        return [vector(force) for force in np.einsum("ki,kij->kj", sizes.reshape(-1, 3), np.array(self._axes))]
 
     @property
     def _freedom(self) -> int:
