@@ -67,7 +67,10 @@ class Program:
             errors = np.where(better, error, errors)
             if not going.any():
                 break
-            dx, dz, dy, share = self._step(x, z, off, rest, gap)
+            try:
+                dx, dz, dy, share = self._step(x, z, off, rest, gap)
+            except np.linalg.LinAlgError:  # rounding at the very end
+                break
             share = np.where(going & np.isfinite(share), share, 0.0)[:, None, None]
             x, z, y = x + _part(share, dx), z + _part(share, dz), y + _part(share[:, 0], dy)
         return best, gains, errors
