@@ -27,7 +27,7 @@ from contactfpga_sim.lab import writer
 sys.path.append(str(ROOT / "tests" / "support"))
 
 from ros_board import flowing
-from tracked import SKIN, frame
+from tracker_frames import SKIN, frame
 
 DOMAIN = 95
 SECONDS = 15

@@ -98,8 +98,8 @@ def wheels(tree: Path, dist: Path, needed: bool) -> None:
         return
     for platform, target in PLATFORMS.items():
         compiler = f"{shlex.quote(sys.executable)} -m ziglang cc -target {target}"
-        told = {"CONTACTFPGA_CC": compiler, "CONTACTFPGA_PLATFORM": platform}
-        command("-m", "hatchling", "build", "--target", "wheel", "--directory", dist, cwd=tree, **told)
+        settings = {"CONTACTFPGA_CC": compiler, "CONTACTFPGA_PLATFORM": platform}
+        command("-m", "hatchling", "build", "--target", "wheel", "--directory", dist, cwd=tree, **settings)
         if not list(dist.glob(f"*-{platform}.whl")):
             sys.exit(f"the reader in C could not be compiled for {platform}; what the compiler said is above")
 

@@ -42,7 +42,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.tools.console.interrupt import guarded
-from contactfpga_hdl.board.sizes import DEVICES, SEEDS, Device, Netlists, Registered
+from contactfpga_hdl.board.sizes import DEVICES, SEEDS, Device, Netlists, RegisterWrapper
 from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_hdl.board.tools import BitstreamFailed
 from contactfpga_sim.apps import size
@@ -244,7 +244,7 @@ def netlists_of(verilog: str, sheet: Sheet) -> Netlists:
         (Path(name) / "top.v").write_text(verilog, encoding="utf-8")
         native.yosys(f"{READ}; flatten; opt_clean; setattr -unset src */*; write_rtlil top.il", Path(name))
         bare = (Path(name) / "top.il").read_text(encoding="utf-8")
-    return Netlists(bare, native.rtlil(Registered(_Behind(sheet))) + bare.replace("\\top\n", "\\labeller\n", 1))
+    return Netlists(bare, native.rtlil(RegisterWrapper(_Behind(sheet))) + bare.replace("\\top\n", "\\labeller\n", 1))
 
 
 class _Behind(wiring.Component):

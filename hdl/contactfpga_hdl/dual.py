@@ -38,12 +38,26 @@ class Dual(wiring.Component):
         breaks = Signal()
         holds = Signal()
         holds_second = Signal(init=1)
+        # Copies, the second a clock behind
         m.submodules.first = ResetInserter(holds)(self.first)
         m.submodules.second = ResetInserter(holds_second)(self.second)
         self._connect(m)
         m.d.comb += differs.eq(self._compare(m) & ~holds_second)
         m.d.sync += holds_second.eq(holds)
-        restarts = self._restart(m, differs, breaks, holds)
+        # Restart: the line breaks off, then rests, and both copies are held
+        pause = PAUSE_BITS * self.skin.derived.bit_clocks
+        scan = self.skin.derived.frame_clocks
+        left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks
+        with m.If(differs):
+            m.d.sync += left.eq(scan + 2 * pause)
+        with m.Elif(left != 0):
+            m.d.sync += left.eq(left - 1)
+        m.d.sync += [
+            breaks.eq(differs | (left > scan + pause)),
+            holds.eq(differs | (left > scan)),
+        ]
+        restarts = differs | (left != 0)
+        # Outputs
         m.d.comb += self.tx.eq(self.first.tx & ~breaks)
         if self.skin.fail_safe:
             m.d.sync += self.contact.eq(self.first.contact | restarts)
@@ -67,18 +81,3 @@ class Dual(wiring.Component):
         before = Signal(len(said))
         m.d.sync += before.eq(said)
         return before != Cat(getattr(self.second, name) for name in names)
-
-    def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value) -> Value:
-        """Restart both copies; returns a level that is high from a difference to the end of the restart."""
-        pause = PAUSE_BITS * self.skin.derived.bit_clocks
-        scan = self.skin.derived.frame_clocks
-        left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks
-        with m.If(differs):
-            m.d.sync += left.eq(scan + 2 * pause)
-        with m.Elif(left != 0):
-            m.d.sync += left.eq(left - 1)
-        m.d.sync += [
-            breaks.eq(differs | (left > scan + pause)),
-            holds.eq(differs | (left > scan)),
-        ]
-        return differs | (left != 0)

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.several import Several
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
@@ -32,6 +32,7 @@ class SeveralTop(wiring.Component):
         m.submodules.transmitter = transmitter = Transmitter(derived.bit_clocks)
         m.submodules.receiver = receiver = receiver_of(derived)
         m.submodules.grants = grants = RoundRobin(len(self.sheets))
+        # Shared pins
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
@@ -39,6 +40,7 @@ class SeveralTop(wiring.Component):
         ]
         # One may be let go as another is touched: a register keeps that from the pin.
         m.d.sync += self.contact.eq(Cat(sheet.contact for sheet in self.sheets).any())
+        # Line of the sheet that has the grant
         for number, sheet in enumerate(self.sheets):
             m.submodules[f"sheet_{number}"] = sheet
             m.d.comb += [sheet.grant.eq(grants.grant[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]
@@ -50,6 +52,7 @@ class SeveralTop(wiring.Component):
                     transmitter.bytes.valid.eq(sheet.bytes.valid),
                     transmitter.bytes.payload.eq(sheet.bytes.payload),
                 ]
+        # Pins of each sheet
         for number, name, member in self._outside():
             inside, outside = getattr(self.sheets[number], name), getattr(self, f"{name}_{number}")
             m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)

@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader
@@ -73,6 +73,7 @@ class Top(wiring.Component):
         if self.skin.dual and not self.copy:
             return self._compared()
         m = Module()
+        # Pipeline, from the sheet to the line
         scan = self._put(m, "scan", self.derived.scan.load_gateware()(self.skin))
         rows = self._debounced(m, scan)
         items, summary = self._zones(m, rows) if self.derived.report.zones else self._bitmap(m, rows)
@@ -84,6 +85,7 @@ class Top(wiring.Component):
         m.d.sync += self._restarts.eq(scan.upset | link.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
+        # Pins and faults
         self._connect_sheet(m, scan)
         units = self._units(m, request, link) if self.skin.units else None
         self._watch_faults(m, scan, packer, units)
@@ -92,6 +94,7 @@ class Top(wiring.Component):
         if self.skin.self_test:
             wiring.connect(m, scan.slots, link.slots)
             m.d.comb += scan.command.eq(request.command & (request.what == SELF_TEST))
+        # Requests and tags
         m.d.comb += [
             scan.request.eq(request.received),
             scan.heard.eq(request.heard),
@@ -103,6 +106,7 @@ class Top(wiring.Component):
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
         ]
+        # Optional parts of the scan
         if moves_sample(self.derived):
             m.d.comb += [scan.moves.eq(request.command & (request.what == SAMPLE_AT)), scan.clocks.eq(request.value)]
         if self.derived.scan.waits:
@@ -156,8 +160,8 @@ class Top(wiring.Component):
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         stuck = scan.stuck if self.derived.scan.waits else 0  # before a frame begins and counts it
-        told = scan.faults.as_value().any() if hasattr(scan, "faults") else 0
-        m.d.comb += fault.eq(scan.tag.fault | stuck | told)
+        reported = scan.faults.as_value().any() if hasattr(scan, "faults") else 0
+        m.d.comb += fault.eq(scan.tag.fault | stuck | reported)
         # Where one may fall as another rises, a register keeps that from the pin.
         if self.skin.fail_safe:
             level = scan.contact | over | fault | unwatched | self._blind(m, packer)

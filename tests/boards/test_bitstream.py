@@ -12,7 +12,7 @@ from contactfpga.boards.spec import bitstream_path
 from contactfpga.design import kits
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_hdl.board import build, placed, tools
+from contactfpga_hdl.board import build, pnr_report, tools
 
 INSTALLED = all(importlib.util.find_spec(f"yowasp_nextpnr_{family}") for family in ("ice40", "ecp5"))
 pytestmark = [
@@ -29,7 +29,7 @@ MARGINS = dict.fromkeys(BOARDS, 1.5) | {"ulx3s-12f-ft232h": 1.25}
 def test_the_default_sheet_fits_and_meets_its_timing(name, tmp_path, capsys):
     assert cli.main(["build", name, "--output", str(tmp_path)]) == 0
     board = BOARDS[name]
-    found = placed.read(tmp_path, build.LOG)
+    found = pnr_report.read(tmp_path, build.LOG)
     assert found.needed_mhz == pytest.approx(board.skin.clock_hz / 1e6, rel=0.01)
     assert found.fmax_mhz > MARGINS[name] * found.needed_mhz
     bitstream = bitstream_path(board, tmp_path)
@@ -43,7 +43,7 @@ def test_the_default_sheet_fits_and_meets_its_timing(name, tmp_path, capsys):
 def test_a_kit_fits_and_meets_its_timing(name, tmp_path):
     kit = kits.kit(name)
     assert cli.main(["build", "--kit", name, "--output", str(tmp_path)]) == 0
-    found = placed.read(tmp_path, build.LOG)
+    found = pnr_report.read(tmp_path, build.LOG)
     assert found.fmax_mhz > MARGINS[kit.board.name] * found.needed_mhz
     assert Skin.load(tmp_path / "skin.toml") == kit.skin
 
@@ -67,7 +67,7 @@ def test_the_fastest_board_keeps_its_margin_from_any_seed(seed, tmp_path):
 def test_64x64_on_shift_registers_fits_the_icebreaker(tmp_path):
     example = Path(__file__).resolve().parents[2] / "examples" / "icebreaker-64x64.toml"
     assert cli.main(["build", "icebreaker", "--skin", str(example), "--output", str(tmp_path)]) == 0
-    found = placed.read(tmp_path, build.LOG)
+    found = pnr_report.read(tmp_path, build.LOG)
     assert found.fmax_mhz > 1.5 * found.needed_mhz
     page = (example.parents[1] / "docs" / "boards.md").read_text()
     assert f"| {found.block_rams[0]} of {found.block_rams[1]} | " in page

@@ -119,7 +119,7 @@ def test_a_difference_or_a_failed_build_is_a_failure(monkeypatch, capsys):
         assert f"FAILED       {error}" in capsys.readouterr().out
 
 
-def test_a_bitstream_that_packs_to_other_bytes_is_told(tmp_path, monkeypatch):
+def test_a_bitstream_that_packs_to_other_bytes_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.which", lambda name, **_: name)
     monkeypatch.setattr(build, "build", lambda *_: bitstream_path(ICEBREAKER, tmp_path).write_bytes(b"one"))
     monkeypatch.setattr(extract, "_run", lambda *_: (tmp_path / "packed.bin").write_bytes(b"two"))

@@ -12,7 +12,7 @@ from contactfpga.boards import BOARDS
 from contactfpga.design import kits
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_hdl.board import build, placed
+from contactfpga_hdl.board import build, pnr_report
 from contactfpga_hdl.board.build import LOG, BitstreamFailed, _why
 from contactfpga_hdl.board.constraints import FOLDER, PAGE, constraints, page_with_tables
 
@@ -41,7 +41,7 @@ def test_the_page_has_the_pin_tables():
 # ---- build, as far as it goes without the tools
 
 
-def test_a_design_that_does_not_fit_is_told_by_numbers(tmp_path):
+def test_a_design_that_does_not_fit_is_reported_by_numbers(tmp_path):
     log = tmp_path / "contactfpga.tim"
     log.write_text("Info:    ICESTORM_LC:    1885/   1280   147%\nInfo:  SB_IO:  20/ 96 20%\n")
     assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1885 ICESTORM_LC of 1280 (147 %)"
@@ -49,7 +49,7 @@ def test_a_design_that_does_not_fit_is_told_by_numbers(tmp_path):
     assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1173 ICESTORM_LC of 1280 (91 %)"
 
 
-def test_without_a_reason_the_first_error_is_told(tmp_path):
+def test_without_a_reason_the_first_error_is_reported(tmp_path):
     assert _why(tmp_path, "Info: y\nERROR: no such pin\nERROR: z") == "ERROR: no such pin"
 
 
@@ -70,7 +70,7 @@ def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
     assert not (tmp_path / "contactfpga.bit").exists()
     assert Skin.load(tmp_path / "skin.toml") == ULX3S.skin
     said = ["LUT4         7 of 9", "flip-flops   5", "block RAMs   1 of 2", "Fmax         20.0 MHz, needed 25 MHz"]
-    assert placed.read(tmp_path, LOG).lines() == said
+    assert pnr_report.read(tmp_path, LOG).lines() == said
 
 
 def test_a_router_that_does_not_end_is_stopped(tmp_path, monkeypatch):
@@ -101,7 +101,7 @@ def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
 
 def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
     def built(skin, board, folder, seed):
-        return placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+        return pnr_report.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
 
     monkeypatch.setattr(build, "build", built)
     assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0

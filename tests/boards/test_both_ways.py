@@ -33,14 +33,14 @@ def test_lines_of_an_unpacked_bitstream():
     text = extract.of_icebox(ICEBOX, SKIN)
     assert "input columns_0__io, output columns_0__o, output columns_0__oe" in text
     assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o, output [1:0] rows_0__oe" in text
-    for told in (
+    for assigned in (
         "rows_0__o[0] = n6",
         "rows_0__oe[0] = n5",
         "rows_0__o[1] = n7",
         "columns_0__o = n9",
         "columns_0__oe = n8",
     ):
-        assert f"assign {told};" in text
+        assert f"assign {assigned};" in text
     assert r"assign n1 = \rows_0__io[0] ;" in text, "what is read stays"
     assert "assign tx = n9 ? n10 : 1'bz;" in text, "and so do other pins"
     assert text.count("1'bz") == 1

@@ -85,7 +85,7 @@ def test_the_circuit_that_a_kit_states_covers_that_of_its_sheet(name):
     check_times(found, kit.skin)
 
 
-def test_a_kit_that_is_not_there_is_told_with_those_that_are(capsys):
+def test_a_kit_that_is_not_there_is_reported_with_those_that_are(capsys):
     assert cli.main(["build", "--kit", "huge"]) == 1
     assert "'huge' is no kit; take one of fast, starter" in capsys.readouterr().err
     assert cli.main(["build", "icestick", "--kit", "starter"]) == 1

@@ -58,7 +58,7 @@ def test_predictions_are_what_is_computed_today(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", kits.names())
-def test_breaks_of_any_line_at_any_time_are_told_as_predicted(name):
+def test_breaks_of_any_line_at_any_time_are_reported_as_predicted(name):
     """40 breaks on the compiled board: none takes longer, and their median is that of as many chances."""
     kit, rng = kits.kit(name), random.Random(1)
     clocks, found = kit.skin.clock_hz // 10**6, []

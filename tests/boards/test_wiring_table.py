@@ -12,7 +12,7 @@ from contactfpga.boards import BOARDS, wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import lay_out
 from contactfpga.tools import cli
-from contactfpga_hdl.board import placed, sites
+from contactfpga_hdl.board import pnr_report, sites
 from contactfpga_hdl.board.build import plan_for
 
 CHAINED = {
@@ -176,7 +176,7 @@ def test_a_sheet_that_does_not_fit_has_no_table(tmp_path, capsys):
 
 
 def test_one_object_holds_what_was_built(tmp_path, monkeypatch, capsys):
-    report = placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+    report = pnr_report.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
     monkeypatch.setattr("contactfpga_hdl.board.build.build", lambda *_: report)
     answer = json.loads(printed(capsys, "icestick", "--json", "--output", str(tmp_path)))
     assert answer["bitstream"] == str(tmp_path / "contactfpga.bin")

@@ -2,7 +2,7 @@
 
 import pytest
 from fake_board import wait_until
-from two_links import FLAT, Plugged, Streaming
+from two_links import FLAT, PluggedPorts, Streaming
 
 import contactfpga
 from contactfpga.robot.body import Body, OpenBody
@@ -23,7 +23,7 @@ def body_of(folder, links):
 
 
 def plugged(**boards):
-    found = Plugged()
+    found = PluggedPorts()
     found.ports = {port: Streaming(skin) for port, skin in boards.items()}
     return found
 

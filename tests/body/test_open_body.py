@@ -8,7 +8,7 @@ import threading
 
 import pytest
 from fake_board import wait_until
-from two_links import Plugged
+from two_links import PluggedPorts
 
 import contactfpga
 from contactfpga.robot.body import Body, NoJoints, NoLinkData, OpenBody
@@ -21,7 +21,7 @@ def test_joints_that_fail_say_so_where_angles_are_needed(patient):
     def joints(_):
         raise KeyError("elbow")
 
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), joints, opened=plugged.opened) as body, body.subscribe() as queue:
         first = queue.next(LONG)
         assert queue.next(LONG).host_time_s > first.host_time_s  # its threads go on
@@ -37,7 +37,7 @@ def statuses(body):
 
 
 def test_open_body_goes_on_without_a_link_and_takes_it_back(patient, leap):
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), lambda _: {"elbow": 0.0}, opened=plugged.opened) as body:
         assert len(body.read(LONG).contacts()) == 2
         port = plugged.ports.pop("a")
@@ -59,7 +59,7 @@ def test_open_body_goes_on_without_a_link_and_takes_it_back(patient, leap):
 
 
 def test_read_waits_for_frames_scanned_after_the_call(patient):
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         body.read(LONG)
         for port in plugged.ports.values():
@@ -69,7 +69,7 @@ def test_read_waits_for_frames_scanned_after_the_call(patient):
 
 
 def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient):
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         with body.subscribe(maxsize=8) as queue:
             times = [queue.next(LONG).host_time_s for _ in range(5)]
@@ -82,7 +82,7 @@ def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient
 def test_a_snapshot_that_waited_tells_of_its_moment_and_is_made_when_it_is_looked_at(patient, leap, monkeypatch):
     made, make = [], States.__getitem__
     monkeypatch.setattr(States, "__getitem__", lambda self, name: made.append(name) or make(self, name))
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         body.read(LONG)
         with body.subscribe() as queue:
@@ -112,7 +112,7 @@ def test_it_is_iterated_as_a_board_is(patient):
                 break
         return found
 
-    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+    with OpenBody(Body.load(patient), opened=PluggedPorts().opened) as body:
         with body.subscribe() as queue:
             for source in (body, queue):
                 synchronous = [snapshot.host_time_s for snapshot, _ in zip(source, range(5))]
@@ -123,7 +123,7 @@ def test_it_is_iterated_as_a_board_is(patient):
 
 def test_batch_holds_each_frame_of_each_link_once(patient):
     batches = []
-    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+    with OpenBody(Body.load(patient), opened=PluggedPorts().opened) as body:
         body.read(LONG)
         wait_until(lambda: batches.append(body.batch(0.05, LONG)) or len(batches[-1]) > 1)
         later = body.batch(0.05, LONG)
@@ -139,7 +139,7 @@ def test_batch_holds_each_frame_of_each_link_once(patient):
 
 
 def test_stats_go_on_where_a_board_comes_back(patient):
-    plugged = Plugged()
+    plugged = PluggedPorts()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         wait_until(lambda: body.stats.links["arm"].frames > 5)
         port = plugged.ports.pop("a")
@@ -157,7 +157,7 @@ def test_stats_go_on_where_a_board_comes_back(patient):
 
 
 def test_closing_wakes_who_waits_and_ends_all_threads(patient):
-    plugged = Plugged()
+    plugged = PluggedPorts()
     before = threading.active_count()
     body = OpenBody(Body.load(patient), opened=plugged.opened)
     queue = body.subscribe()
@@ -169,7 +169,7 @@ def test_closing_wakes_who_waits_and_ends_all_threads(patient):
 
 
 def test_link_whose_code_fails_is_lost_and_says_why(patient):
-    plugged = Plugged()
+    plugged = PluggedPorts()
 
     def opened(plan):
         if plan.name == "arm":

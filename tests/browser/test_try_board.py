@@ -96,8 +96,8 @@ def test_times_of_a_touch_are_those_of_the_native_board():
         starts = [touched(board, gap, cells, hold) for gap, cells in touches]
         pin = [int(event["cycle"]) for event in board.take("contact") if event["data"]]
         stream = [(int(event["cycle"]), int(event["data"])) for event in board.take("received")]
-    told = [each for each in frames_in(KIT.skin, stream) if each.frame.cells == 6 and each.frame.zones == 1]
-    last = [next(each.last for each in told if each.last > start) for start in starts]
+    reported = [each for each in frames_in(KIT.skin, stream) if each.frame.cells == 6 and each.frame.zones == 1]
+    last = [next(each.last for each in reported if each.last > start) for start in starts]
     assert found == [list(times) for times in zip(starts, pin, last, strict=True)]
 
 

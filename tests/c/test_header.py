@@ -134,8 +134,8 @@ def frame_line(zones: Zones) -> str:
     words = [",".join(map(str, row)) for row in items.tolist()]
     if frame.bitmap is not None:
         words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
-    told = (frame.sequence, flags, frame.heard, frame.cells, frame.zones, frame.overwritten)
-    return " ".join(map(str, ("frame", zones.time_us, *told, *words)))
+    fields = (frame.sequence, flags, frame.heard, frame.cells, frame.zones, frame.overwritten)
+    return " ".join(map(str, ("frame", zones.time_us, *fields, *words)))
 
 
 def zones(rng, skin) -> list:

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from contactfpga.design.circuit import Circuit, CircuitError, fitted
-from contactfpga.design.circuit.fitted import SettleReading, fit_circuit
+from contactfpga.design.circuit import Circuit, CircuitError, fit
+from contactfpga.design.circuit.fit import SettleReading, fit_circuit
 from contactfpga_sim.model.sheet.line import ColumnLine
 
 SIZE = 16
@@ -28,8 +28,8 @@ def readings(seconds, rng, scatter, clock_hz=CLOCK_HZ, shape=(SIZE, SIZE // 2)):
 @pytest.mark.parametrize(("scatter", "clock_hz"), [(0.04, 60e6), (0.08, 24e6)])
 def test_all_intervals_together_cover_the_truth_as_often_as_they_say(scatter, clock_hz, monkeypatch):
     """Of 300 sheets: two standard deviations of their number below and above 95 %, and 1 % for the approximation."""
-    monkeypatch.setattr(fitted, "settle_s", formula_s)
-    monkeypatch.setattr(fitted, "DRAWS", 4000)
+    monkeypatch.setattr(fit, "settle_s", formula_s)
+    monkeypatch.setattr(fit, "DRAWS", 4000)
     covered = 0
     for seed in range(300):
         rng = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def test_lines_that_do_not_scatter_give_the_values_that_made_them():
 
 
 def test_one_image_tells_the_capacitance_alone(monkeypatch):
-    monkeypatch.setattr(fitted, "settle_s", formula_s)
+    monkeypatch.setattr(fit, "settle_s", formula_s)
     truth = STATED.replace(line_pf=70)
     made = readings({16: formula_s(truth, 0, 0, "", 16)}, np.random.default_rng(1), 0.02)
     (only,) = fit_circuit(STATED, made, CLOCK_HZ, SIZE, SIZE).values
@@ -67,7 +67,7 @@ def test_one_image_tells_the_capacitance_alone(monkeypatch):
 
 
 def test_cells_that_are_not_known_cost_the_lines_with_the_most_of_them(monkeypatch):
-    monkeypatch.setattr(fitted, "settle_s", formula_s)
+    monkeypatch.setattr(fit, "settle_s", formula_s)
     made = readings({many: formula_s(STATED, 0, 0, "", many) for many in (9, 17)}, np.random.default_rng(2), 0.04)
     made[0].clocks[3], made[1].clocks[5, 2] = 0, 0
     found = fit_circuit(STATED, made, CLOCK_HZ, SIZE, SIZE)
@@ -78,7 +78,7 @@ def test_cells_that_are_not_known_cost_the_lines_with_the_most_of_them(monkeypat
 
 
 def test_what_tells_nothing_is_refused(monkeypatch):
-    monkeypatch.setattr(fitted, "settle_s", formula_s)
+    monkeypatch.setattr(fit, "settle_s", formula_s)
     slow = readings({9: 30e-9, 17: 50e-9}, np.random.default_rng(3), 0.02)
     with pytest.raises(
         CircuitError, match="with 9 switches pressed in a row, cells read pressed at the first sample, 2"

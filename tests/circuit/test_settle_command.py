@@ -63,13 +63,13 @@ def test_every_value_of_the_circuit_has_an_option_that_counts(capsys):
 def test_an_option_says_what_the_class_says_of_its_value():
     parser = cli._parser().topics["settle"]
     parser.complete()
-    told = {action.dest: action.help for action in parser._actions}
-    assert told["crossing_pf"] == (
+    texts = {action.dest: action.help for action in parser._actions}
+    assert texts["crossing_pf"] == (
         "Capacitance of a row to a column at their crossing, with an open switch (default: 2 pF)."
     )
-    assert told["diode_saturation_a"] == "Saturation current (schottky: 1.5e-07 A)."
-    assert told["pin_ma"].endswith("with its usual drive strength (default: 8 mA).")  # the first sentence alone
-    assert told["diode_grading"] == "Grading coefficient (schottky: 0.5)."
+    assert texts["diode_saturation_a"] == "Saturation current (schottky: 1.5e-07 A)."
+    assert texts["pin_ma"].endswith("with its usual drive strength (default: 8 mA).")  # the first sentence alone
+    assert texts["diode_grading"] == "Grading coefficient (schottky: 0.5)."
 
 
 def test_a_sheet_that_cannot_work_says_which_and_what_helps(capsys):

@@ -12,7 +12,7 @@ from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, dra
 
 from contactfpga import Skin
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, fitted, load_circuit
+from contactfpga.design.circuit import Circuit, fit, load_circuit
 from contactfpga.design.predictions import Prediction
 from contactfpga.instruments.settling import Slow
 from contactfpga.tools.commands import bringup
@@ -133,8 +133,8 @@ def formula_s(circuit, rows, columns, diodes, pressed):
 def test_a_stuck_switch_biases_no_value(stuck, monkeypatch):
     """300 images under a card and a plate, with a stuck switch beside the card: its row pulls one column more. Values
     are off by less than three standard deviations of their mean, and intervals cover the truth as often as they say."""
-    monkeypatch.setattr(fitted, "settle_s", formula_s)
-    monkeypatch.setattr(fitted, "DRAWS", 4000)
+    monkeypatch.setattr(fit, "settle_s", formula_s)
+    monkeypatch.setattr(fit, "DRAWS", 4000)
     off = []
     for seed in range(300):
         rng = np.random.default_rng(seed)
@@ -148,7 +148,7 @@ def test_a_stuck_switch_biases_no_value(stuck, monkeypatch):
             clocks = pressed * np.ceil(12e6 * lines * np.array(seconds)[:, None]).astype(int)
             image = types.SimpleNamespace(clocks=clocks, first=2, slow=lambda: Slow([], [], []))
             readings.append(times._reading(image, (), True))
-        values = fitted.fit_circuit(CIRCUIT, readings, 12e6, 13, 13).values
+        values = fit.fit_circuit(CIRCUIT, readings, 12e6, 13, 13).values
         off.append([2 * (one.value - getattr(truth, one.name)) / (one.high - one.low) for one in values])
     off = np.array(off)
     assert (abs(off.mean(axis=0)) < 3 * off.std(axis=0) / np.sqrt(len(off))).all()

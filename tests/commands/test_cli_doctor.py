@@ -56,12 +56,12 @@ def test_doctor_counts_what_is_lost(board, run):
     assert "fault 7 lost, 0 damaged" in out
 
 
-@pytest.mark.parametrize(("skip", "told"), [(7, True), (0, False)])
-def test_doctor_asks_for_a_second_reader_where_bytes_are_taken_away(board, run, skip, told):
+@pytest.mark.parametrize(("skip", "warns"), [(7, True), (0, False)])
+def test_doctor_asks_for_a_second_reader_where_bytes_are_taken_away(board, run, skip, warns):
     _, out, _ = doctored(run, board, "--seconds", 0.015, skip=skip, cut=5)
     assert f"fault {skip + 2} lost, 1 damaged" in out
     question = f"does another program read this port? `fuser {board.path}` lists them"
-    assert (question in " ".join(out.split())) == told
+    assert (question in " ".join(out.split())) == warns
 
 
 def test_doctor_prints_one_json_object(board, run):
@@ -93,7 +93,7 @@ def test_doctor_takes_a_board_without_frames_for_a_fault(board, run):
 
 
 @pytest.mark.parametrize(
-    ("board_s", "host_s", "told"),
+    ("board_s", "host_s", "reported"),
     [
         (1.0, 1.0, None),
         (1.039, 1.0, None),
@@ -104,10 +104,10 @@ def test_doctor_takes_a_board_without_frames_for_a_fault(board, run):
         (1.0, 0.0, None),  # a recording has no times of its own
     ],
 )
-def test_doctor_compares_clocks(board_s, host_s, told):
+def test_doctor_compares_clocks(board_s, host_s, reported):
     findings = list(health.clock(board_s, host_s))
-    assert [verdict for verdict, _ in findings] == ([] if told is None else ["note"])
-    assert told is None or told in findings[0][1]
+    assert [verdict for verdict, _ in findings] == ([] if reported is None else ["note"])
+    assert reported is None or reported in findings[0][1]
 
 
 def test_doctor_takes_ghosts_for_no_fault(run):

@@ -52,7 +52,7 @@ def test_the_fast_example_reaches_its_figures(run):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cells", ["1x1", "2x5", "16x16"])
-def test_the_figures_are_told_in_words(run, cells):
+def test_the_figures_are_reported_in_words(run, cells):
     status, out, _ = run("--skin", FILE, "--cells", cells, "--touches", "2", "--exact")
     assert status == 0
     assert "16x16, scan 'reversal', 24 MHz, 12 Mbaud" in out
@@ -196,7 +196,7 @@ def test_all_rows_and_the_picture(run, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_settings_of_the_bridge_are_told(run):
+def test_settings_of_the_bridge_are_reported(run):
     status, out, _ = run(
         "--board", "icebreaker", "--touches", "1", "--exact", "--timer", "2", "--no-event-char", "--json"
     )

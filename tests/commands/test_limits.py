@@ -1,4 +1,4 @@
-"""What a file from a stranger may cost: memory and processor time are bounded, and a limit is told in one line."""
+"""What a file from a stranger may cost: memory and processor time are bounded, and a limit is reported in one line."""
 
 import io
 import time
@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from contactfpga import ContactFPGAError, Skin, SkinError
 from contactfpga.design.cover.task import Task
 from contactfpga.inputs import array_file, tomlfile, values, xmlfile
-from contactfpga.robot.body import Body, BodyError, folds, packed, urdf
+from contactfpga.robot.body import Body, BodyError, folds, robot_texts, urdf
 from contactfpga.robot.body.folds import Folds
 from contactfpga.robot.body.kinematics import Kinematics
 from contactfpga.robot.haptics import LoadCells
@@ -51,7 +51,8 @@ class Cost:
 
 
 @pytest.mark.parametrize(
-    "read", [Skin.load, Body.load, packed.pack, lambda path: packed.unpack({packed.TOML: DOTTED}, path.parent)]
+    "read",
+    [Skin.load, Body.load, robot_texts.pack, lambda path: robot_texts.unpack({robot_texts.TOML: DOTTED}, path.parent)],
 )
 def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, read):
     path = tmp_path / "skin.toml"

@@ -96,7 +96,7 @@ ERRORS = [KeyboardInterrupt(), contactfpga.ReadTimeout("no frame came")]
 
 
 @pytest.mark.parametrize("error", sample(ERRORS, quick=ERRORS[:1], slow=ERRORS[1:]))
-def test_what_was_found_is_told_and_the_board_left_as_it_was(capsys, error):
+def test_what_was_found_is_reported_and_the_board_left_as_it_was(capsys, error):
     """It ends while the board samples early, in the middle of a frame. Other tests compile this board as well."""
     pressed, stops = np.ones((COMMON.rows, COMMON.columns), bool), [0.03125]
 
@@ -129,7 +129,7 @@ class Dying(DirectPort):
         super().write(data)
 
 
-def test_a_board_that_is_unplugged_is_told(capsys):
+def test_a_board_that_is_unplugged_is_reported(capsys):
     with contactfpga.open(Dying(SKIN), skin=SKIN) as board:
         assert settle.measure(board, arguments(None, in_json=False)) == 1
     said = capsys.readouterr().out

@@ -213,7 +213,7 @@ def test_a_signal_while_listening_begins_or_ends_is_no_traceback(moment, monkeyp
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_what_fails_after_the_usual_end_is_told(number, capsys):
+def test_what_fails_after_the_usual_end_is_reported(number, capsys):
     """Signals are handled as before once a command is done."""
     before = [signal.getsignal(one) for one in SIGNALS]
 

@@ -35,7 +35,7 @@ FRAMES = 24
 
 
 @dataclasses.dataclass
-class Packed:
+class PackedItem:
     """What the golden model's packer takes in a clock: an item, or with it None the end mark of a frame. Without a
     closing word neither: a restart, which drops the frame that is being filled."""
 
@@ -44,7 +44,7 @@ class Packed:
     sent: bool = False
 
 
-class Watched:
+class WatchedQueue:
     """A queue in front of the golden model's packer, whose items are noted."""
 
     def __init__(self, queue, noted):
@@ -55,16 +55,16 @@ class Watched:
 
     def take(self, cycle, item):
         self._queue.take(cycle, item)
-        self._noted[cycle] = Packed(item)
+        self._noted[cycle] = PackedItem(item)
 
 
 def packed(skin, timeline, clocks, monkeypatch):
-    """By clock what the packer takes."""
+    """Items that the packer takes, by clock."""
     noted = {}
 
     class Noting(Packer):
         def __init__(self, facts, link, queue):
-            super().__init__(facts, link, Watched(queue, noted))
+            super().__init__(facts, link, WatchedQueue(queue, noted))
 
         def _is_sent(self, items, taken):
             zones = len(items.records) if skin.report != "cells" else 0
@@ -76,7 +76,7 @@ def packed(skin, timeline, clocks, monkeypatch):
                 "fault": items.scan.fault,
                 "motion": items.scan.motion,
             }
-            noted[taken] = Packed(None, closing, super()._is_sent(items, taken))
+            noted[taken] = PackedItem(None, closing, super()._is_sent(items, taken))
             return noted[taken].sent
 
     monkeypatch.setattr(sys.modules["contactfpga_sim.model.golden.predict"], "Packer", Noting)
@@ -94,7 +94,7 @@ def word(fields, values):
 
 
 def offered(skin, noted, takes):
-    """In each clock the word on offer as (data, last), or None: docs/ip.md in Python."""
+    """Word on offer in each clock as (data, last), or None: docs/ip.md in Python."""
     filling, reading, waiting, out = [], [], None, None
     number, owed, seen = 0, False, []
     for clock, taken in enumerate(takes):
@@ -119,7 +119,7 @@ def offered(skin, noted, takes):
 
 
 @dataclasses.dataclass
-class Played:
+class CoreRun:
     """A core that was simulated in Amaranth's simulator."""
 
     ports: list[ip.Port]
@@ -134,18 +134,18 @@ class Played:
             place += port.bits
 
     def levels(self, name):
-        """Of a port in each clock."""
+        """Levels of a port in each clock."""
         place, mask = self._places[name]
         return [one >> place & mask for one in self.words]
 
     def records(self):
-        """As :func:`offered`."""
+        """Record words in each clock, as :func:`offered`."""
         some = (self.levels(f"m_axis_records_t{name}") for name in ("valid", "data", "last"))
         return [(data, bool(last)) if valid else None for valid, data, last in zip(*some, strict=True)]
 
 
 def frames(rng, skin):
-    """Cells that change about every scan, as (clock, cells)."""
+    """Random cells that change about every scan, as (clock, cells)."""
     scan = skin.derived.frame_clocks
     at = ip.RESET + 10
     for _ in range(FRAMES):
@@ -164,7 +164,7 @@ def play(skin, seed, takes, received=()):
     timeline = Timeline([(clock, cells, None) for clock, cells in given], list(received))
     words = ip.simulated(skin, core, ports, timeline, clocks, lambda clock: (clock % 3 == 0, taken[clock]))
     late = Timeline([(clock - ip.RESET, cells, None) for clock, cells in given])
-    return Played(ports, words, taken), late
+    return CoreRun(ports, words, taken), late
 
 
 def stalling(seed):
@@ -181,7 +181,7 @@ def stalling(seed):
 
 
 def numbers(skin, words):
-    """Of the frames that these words close."""
+    """Numbers of the frames that these words close."""
     fields = ip.closing_fields(skin)
     low = sum(bits for name, bits in fields.items() if name == "time")
     return [data >> low & 0xFFFF for data, last in words if last]
@@ -226,8 +226,8 @@ def test_the_exported_file_does_the_same_in_every_clock(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["moments", "on change"])
 def test_a_reader_that_never_takes_keeps_its_frame_and_holds_up_nothing(name):
-    """It takes all again in the end: the frame that it was offered, then the newest one, whose number says how many
-    were replaced."""
+    """A reader that takes no words until the end gets the frame that it was offered first, then the newest one, whose
+    number says how many were replaced."""
     skin = SKINS[name]
     begins = FRAMES * skin.derived.frame_clocks // 2
     waited, _ = play(skin, 3, lambda clock: clock >= begins)
@@ -276,12 +276,12 @@ def test_records_that_come_at_any_time_go_out_as_frames(seed):
             comes, sent, item = rng.random() < 0.3, rng.random() < 0.5, rng.randrange(1 << 16)
             restarts = not comes and rng.random() < 0.02
             if restarts:
-                noted[clock], left = Packed(None), 0
+                noted[clock], left = PackedItem(None), 0
             if comes:
-                told = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
-                noted[clock] = Packed(item) if left else Packed(None, told, sent)
-                ctx.set(dut.tag.time, told["time"])
-                ctx.set(dut.summary, {"zones": told["zones"], "cells": told["cells"]})
+                closing = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
+                noted[clock] = PackedItem(item) if left else PackedItem(None, closing, sent)
+                ctx.set(dut.tag.time, closing["time"])
+                ctx.set(dut.summary, {"zones": closing["zones"], "cells": closing["cells"]})
             ctx.set(dut.restart, restarts)
             ctx.set(dut.taken, comes)
             ctx.set(dut.send, sent)

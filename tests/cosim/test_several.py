@@ -73,7 +73,7 @@ def asked(cycles, sheets, bit_clocks, seed=0):
 
 
 def heard(traces):
-    """What the driver makes of the line: conversations by sheet."""
+    """Results of the driver for the bytes on the line: conversations by sheet."""
     line = bytes(value for _, value in sorted(itertools.chain(*(trace.bytes for trace in traces))))
     sorter, found = Sorter(), [Conversation(f"sheet {number}") for number in range(len(traces))]
     for number, packet in sorter.take(line):
@@ -139,7 +139,8 @@ def test_a_fault_of_the_grants_is_seen(monkeypatch):
 
 
 def test_a_sheet_waits_for_one_packet_of_each_other_one():
-    """Three sheets that always have something to say, one of them long packets."""
+    """Three sheets always have a packet to send, one of them long ones: each waits for at most one packet of each
+    other."""
     big = Skin(rows=16, columns=16, report="cells", settle_us=5.0, **REGISTERS)
     skins = [skin.replace(clock_hz=12_000_000, baud=1_000_000) for skin in (*SMALL.skins, big)]
     several = Several(tuple(skins))

@@ -16,7 +16,7 @@ from contactfpga import Skin, SkinError, boards
 from contactfpga.choices.choice import own_files
 from contactfpga.errors import UNSOLVED
 from contactfpga.tools import cli
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.chart import methods, numbers, picture
 from contactfpga_sim.lab.chart.compute import Task, study
 from contactfpga_sim.model.board.virtual import VirtualBoard
@@ -121,7 +121,7 @@ def test_the_virtual_board_and_the_driver_use_it():
 def test_what_is_kept_of_it_depends_on_its_file():
     assert own_files(SKIN) == {Path(toy_labeller.__file__)}
     assert own_files(Skin()) == set()
-    toy, run = (kept.made_by("contactfpga_sim.apps.kept", SKIN.replace(labeller=each)) for each in (TOY, "run"))
+    toy, run = (result_cache.made_by(result_cache.__name__, SKIN.replace(labeller=each)) for each in (TOY, "run"))
     assert toy != run
 
 

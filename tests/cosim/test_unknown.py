@@ -89,7 +89,7 @@ def test_a_register_without_a_reset_is_seen(monkeypatch):
 
 
 @with_icarus
-def test_lines_that_are_driven_against_each_other_are_told(monkeypatch):
+def test_lines_that_are_driven_against_each_other_are_reported(monkeypatch):
     never_let_go(monkeypatch)
     cycles = 6 * facts(SMALL).scan_clocks
     skin = SKINS["reversal"]

@@ -91,7 +91,7 @@ def test_it_begins_before_the_touch_and_ends_with_the_frame(written):
     assert all(changes[0][0] == 0 for changes in signals.values())
 
 
-def test_a_gateware_that_is_wrong_is_told_in_one_line(tmp_path, monkeypatch, run):
+def test_a_gateware_that_is_wrong_is_reported_in_one_line(tmp_path, monkeypatch, run):
     def without_a_record(skin, timeline, cycles, **_):
         trace = golden.predict(skin, timeline, cycles)
         return dataclasses.replace(trace, records=trace.records[:-1])

@@ -48,7 +48,7 @@ def test_an_address_has_one_reading(address, meant):
         ("sim://?pace=0", "pace is '0'; it must be a positive number up to 1e6, 1 for real time"),
     ],
 )
-def test_what_is_no_address_is_told(address, message):
+def test_what_is_no_address_is_reported(address, message):
     with pytest.raises(AddressError) as caught:
         parse(address)
     assert message in str(caught.value)
@@ -69,7 +69,7 @@ def test_files_of_any_name_make_a_board(tmp_path):
 
 
 @pytest.mark.parametrize("option", ["skin", "scene", "units", "sheets"])
-def test_a_file_that_is_not_there_is_told(option):
+def test_a_file_that_is_not_there_is_reported(option):
     address = f"sim://?{option}=nowhere.npy"
     says = f"{address} cannot be opened: nowhere.npy: No such file or directory; is the path right?"
     with pytest.raises(PortNotFound, match=f"^{re.escape(says)}$"):

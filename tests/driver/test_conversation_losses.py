@@ -1,4 +1,4 @@
-"""What the conversation makes of losses, restarts and other Skins."""
+"""Losses, restarts and other Skins in a conversation."""
 
 import pytest
 from model_board import SCAN_US, SKIN, Line, ModelBoard
@@ -42,7 +42,8 @@ def test_frames_sent_before_the_port_was_opened_are_no_loss():
 
 @pytest.mark.parametrize("second", range(0, 34, 1))
 def test_a_lost_frame_is_no_restart_at_any_time_of_the_wrap(second):
-    """In one second of every 16.8 the first frame of 256 was once taken for the first one since power-up."""
+    """A frame lost at any time is no restart; in one second of every 16.8, the first frame of 256 once counted as the
+    first since power-up."""
     line = Line()
     line.board.time_us, line.board.sent = second * 500_000 + SCAN_US, 250
     line.board.heard = 5
@@ -57,7 +58,8 @@ def test_a_lost_frame_is_no_restart_at_any_time_of_the_wrap(second):
 
 
 def test_frames_that_come_twice_are_passed_on_once(rng):
-    """Until the next hello nothing more is, as the board may have been restarted."""
+    """Repeated frames are delivered once; after them no frame is delivered until the next hello, as the board may have
+    restarted."""
     for _ in range(30):
         line, sent = Line(), []
         line.board.heard = 3
@@ -78,7 +80,7 @@ def test_frames_that_come_twice_are_passed_on_once(rng):
 # ---- restarts
 
 
-def test_a_restart_is_told_by_its_hello():
+def test_a_restart_is_reported_by_its_hello():
     line = Line()
     line.board.sent, line.board.time_us, line.board.heard = 100, 5_000_000, 3
     line.hello()

@@ -59,7 +59,7 @@ def test_silence(board):
     assert "doctor" in str(caught.value)
 
 
-class Unasked(DirectPort):
+class RepeatingPort(DirectPort):
     """A port in simulated time that says the same over and over, and answers nothing."""
 
     def __init__(self, data):
@@ -83,8 +83,8 @@ class Unasked(DirectPort):
     ],
     ids=["noise", "hellos", "frames without a hello"],
 )
-def test_what_comes_in_place_of_frames_is_told(data, error, said):
-    with pytest.raises(contactfpga.ReadTimeout, match=said) as caught, contactfpga.open(Unasked(data)) as opened:
+def test_what_comes_in_place_of_frames_is_reported(data, error, said):
+    with pytest.raises(contactfpga.ReadTimeout, match=said) as caught, contactfpga.open(RepeatingPort(data)) as opened:
         opened.read()
     assert type(caught.value) is error
 
@@ -99,7 +99,7 @@ def test_unplugged_while_waiting(board):
 
 
 @pytest.mark.usefixtures("_asks_once")
-def test_a_board_that_is_unplugged_is_told_of_after_its_frames(board):
+def test_a_board_that_is_unplugged_is_reported_after_its_frames(board):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         opened.next(LONG)
         board.answers = False
@@ -112,7 +112,7 @@ def test_a_board_that_is_unplugged_is_told_of_after_its_frames(board):
                 call(timeout=LONG)
 
 
-def test_a_port_that_came_back_is_opened_again_and_one_that_stays_away_is_told(tmp_path):
+def test_a_port_that_came_back_is_opened_again_and_one_that_stays_away_is_reported(tmp_path):
     link = tmp_path / "port"
     with FakeBoard(SKIN, link):
         contactfpga.read_zones(str(link), timeout=LONG)

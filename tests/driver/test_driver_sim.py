@@ -57,7 +57,8 @@ def test_a_paced_board_goes_on_while_nobody_reads_and_is_never_ahead(pace):
 
 @pytest.mark.slow
 def test_simulated_board_loses_nothing():
-    """By the frames, and by the gateware's own counters: at each hello the frames sent are those received."""
+    """No frame is lost by the frames and by the gateware's own counter: at each hello, as many were sent as were
+    received."""
     with contactfpga.open("sim://?scene=moving") as opened:
         frames = list(itertools.islice(opened, 7_000))
         stats = opened.stats
@@ -129,7 +130,8 @@ def test_a_skin_beside_the_address_of_a_virtual_board_says_where_to_put_it():
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("call", ["next", "read", "latest", "batch"])
 def test_a_function_that_reads_its_own_board_is_told_so(call):
-    """It would wait for time that passes once it has returned."""
+    """A function that drives a simulated board cannot read it: it would wait for time that passes once it has
+    returned."""
 
     def press(seconds):
         if len(opened) and seconds > 0.01:
@@ -201,7 +203,7 @@ def test_a_client_that_left_does_not_end_the_board(pty_board):
             assert opened.next(LONG).pressed == opened.next(LONG).pressed
 
 
-def test_a_scene_that_raises_ends_the_port_and_is_told():
+def test_a_scene_that_raises_ends_the_port_and_is_reported():
     from contactfpga_sim.model.board.pty_board import PtyBoard
 
     def press(seconds):

@@ -62,7 +62,7 @@ def test_a_flagged_frame_says_which_lines_are_faulty(word, names):
     line.tell(word)
     assert line.faults() == names
     assert line.faults(flagged=False) == ()
-    assert line.host.lines.told.names == names
+    assert line.host.lines.reported.names == names
 
 
 def test_lines_whose_switches_are_all_masked_are_not_counted_among_all():
@@ -92,7 +92,7 @@ def test_a_board_without_guard_lines_says_stuck():
     assert tested.faults() == ("joined lines",)
 
 
-def test_a_fault_whose_name_has_not_come_is_told_without():
+def test_a_fault_whose_name_has_not_come_is_reported_without():
     line = Line()
     line.give(line.board.hello())
     assert line.faults() == ("unnamed fault",)
@@ -124,11 +124,11 @@ def test_a_restart_and_another_skin_forget_names(skin):
     line.board = ModelBoard(skin)
     line.now += 1.0
     line.give(line.board.hello())
-    assert line.host.lines.told is None
+    assert line.host.lines.reported is None
     assert line.faults() == ("unnamed fault",)
 
 
-def test_reports_are_told_only_when_they_differ():
+def test_reports_are_delivered_only_when_they_differ():
     line = Line()
     assert [type(event).__name__ for event in line.hello()] == ["Hello"]
     assert line.tell(ROW_3) == [Faults(rows_open=(3,))]

@@ -109,7 +109,8 @@ def test_a_request_is_answered_by_a_frame_that_began_later(simulated):
 
 
 def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated):
-    """Else a reader in the network would know no times after a break, and get no frames any more."""
+    """The port sends hellos unrequested; without them, a reader in the network would know no times after a break and
+    would get no more frames."""
     hellos = simulated.stats.hellos
     for _ in range(200):
         assert simulated.clock() - simulated.next().time_us / 1e6 == pytest.approx(7.0, abs=0.01)
@@ -119,7 +120,8 @@ def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated
 
 
 def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
-    """Of frames with 514 bytes, 1 of 2,000 bytes lost damages one in four."""
+    """One of 2,000 bytes is lost, so that one of four frames of 514 bytes is damaged: these are lost, and no other is
+    shifted."""
     touch = Touch((8, 16))
     with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
         frames, stats = frames_of(board, sheet, touch, 60), board.stats
@@ -190,7 +192,7 @@ def test_an_address_has_one_reading(address, meant):
         ("flexitac:///dev/x?rows=999", "rows is '999'; it must be a whole number from 1 to 64"),
     ],
 )
-def test_what_is_no_address_is_told(address, message):
+def test_what_is_no_address_is_reported(address, message):
     with pytest.raises(AddressError) as caught:
         parse(address)
     assert message in str(caught.value)
@@ -211,7 +213,7 @@ def test_what_is_no_address_is_told(address, message):
         ({}, "?frames=1000", contactfpga.ReadTimeout, "the first frames tell how cells read at rest; give it a longer"),
     ],
 )
-def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, said):
+def test_a_sheet_without_a_frame_is_reported_by_what_it_sent(sheet, options, error, said):
     def raised(timeout_s):
         with pytest.raises(contactfpga.ReadTimeout) as caught:
             contactfpga.open(f"flexitac://{sent.port}{options}", timeout=timeout_s)
@@ -224,6 +226,6 @@ def test_a_sheet_without_a_frame_is_told_by_what_it_sent(sheet, options, error, 
     assert "hello" not in str(found)
 
 
-def test_a_port_that_is_not_there_is_told():
+def test_a_port_that_is_not_there_is_reported():
     with pytest.raises(PortNotFound, match="/dev/nowhere"):
         contactfpga.open("flexitac:///dev/nowhere")

@@ -48,7 +48,7 @@ def refused(call):
 
 
 def run(program, *arguments):
-    """What a program of its own prints."""
+    """Output of a program in a process of its own."""
     command = [sys.executable, "-c", HEAD + program, *map(str, arguments)]
     path = os.pathsep.join(sys.path)
     done = subprocess.run(command, capture_output=True, text=True, timeout=250, env=environment(PYTHONPATH=path))
@@ -89,7 +89,7 @@ again = contactfpga.open(port, timeout=60)
 
 @pytest.mark.slow
 def test_children_of_a_busy_board_end_at_any_moment(board):
-    """While other threads of the parent read, ask and hold locks."""
+    """Children end though other threads of the parent read, request and hold locks at the fork."""
     board.stream = board.frame
     board.hello_s = 0.05
     program = """
@@ -204,10 +204,10 @@ board.read()
 @pytest.mark.slow
 def test_a_body_in_a_child_is_closed(tmp_path):
     program = """
-from two_links import Plugged
+from two_links import PluggedPorts
 from contactfpga.robot.body import Body
 from contactfpga.robot.body import OpenBody
-body = OpenBody(Body.load(port), opened=Plugged().opened)
+body = OpenBody(Body.load(port), opened=PluggedPorts().opened)
 snapshots = body.subscribe()
 body.read(60)
 

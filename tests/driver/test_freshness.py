@@ -99,11 +99,11 @@ def test_the_logger_tells_of_the_board_its_restarts_and_losses(caplog):
             board.next()
         world.pause(1_200_000)
         board.latest()
-        told = [(record.levelname, record.getMessage()) for record in caplog.records]
+        reported = [(record.levelname, record.getMessage()) for record in caplog.records]
         lost = board.stats.lost
     port = board.port
     assert lost > 0
-    assert told == [
+    assert reported == [
         ("WARNING", f"{port}: the board was restarted"),
         ("WARNING", f"{port}: {lost} frames were lost, {lost} since the port was opened"),
     ]
@@ -158,8 +158,8 @@ def test_a_hello_that_repeats_another_number_is_none_of_ours():
 
 
 def test_a_random_number_does_not_continue_what_was_sent_of_late():
-    """Of two frames that waited in the board while the hello went ahead, one may carry an older number with the same
-    lowest bits, and the other one the next of these."""
+    """A random number never has the lowest bits of a recent one if the next number's were sent since: two frames that
+    waited in the board while the hello went ahead could carry them."""
     for seed in range(300):
         requests, lows = Requests(random.Random(seed)), []
         for turn in range(6):

@@ -7,7 +7,7 @@ import random
 
 import pytest
 from sample import sample
-from scheduled import Schedule
+from schedule import Schedule
 from world import Witness, World
 
 from contactfpga import BoardClosed, Skin
@@ -101,7 +101,7 @@ class History:
             Witness(self.world).check(self.board.latest(1.0))
 
     def calls(self, call, *arguments):
-        """A thread's work until the board is closed, which nothing but BoardClosed says."""
+        """Repeat a thread's call until the board is closed, which only BoardClosed says."""
         try:
             while True:
                 call(*arguments)

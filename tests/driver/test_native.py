@@ -141,7 +141,8 @@ def test_frames_come_while_no_python_thread_runs(board):
 
 
 def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
-    """So a board that sends more than Python decodes fills no ring with frames that grow old."""
+    """Undecoded packets stay with the operating system, so that a board that sends more than Python decodes fills no
+    ring with frames that grow old."""
     master, slave = os.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)
@@ -173,7 +174,8 @@ def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
 
 
 def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(board):
-    """Even where it tells more of the clocks: each comes in another piece of their fit."""
+    """`latest` is quick while a thread works through old frames, even if each frame starts another piece of the clock's
+    fit."""
     with opened(board) as host:
         host.read(LONG)
         board.answers = False

@@ -104,7 +104,7 @@ class History(RuleBasedStateMachine):
             self.read_on_a_good_line()
             self.world.pause(1_200_000)
             self.read_on_a_good_line()
-            self.witness.check_told(self.board.faults)
+            self.witness.check_reported(self.board.faults)
 
     @precondition(lambda self: self.board)
     @rule()
@@ -277,5 +277,5 @@ RARE = {restart_by_the_sequence, packets_are_too_long, reports_are_for_good}
 )
 def test_a_defect_that_is_put_back_is_found(monkeypatch, defect):
     defect(monkeypatch)
-    with pytest.raises(DEFECTS[defect], match=r"never sent|asked for|no frame within|never told"):
+    with pytest.raises(DEFECTS[defect], match=r"never sent|asked for|no frame within|never reported"):
         run_state_machine_as_test(History, settings=settings(BUDGET, max_examples=5000))

@@ -125,7 +125,8 @@ def test_a_name_tells_identical_boards_apart(three):
 
 
 def test_the_name_in_a_skin_tells_identical_boards_apart(three):
-    """And a board without that name is taken where it is the only one of its Skin: names are no part of it."""
+    """A Skin's name selects one of several boards; a board without that name is taken if it is the only one of its
+    Skin."""
     with contactfpga.open(skin=SKIN.replace(name="RIGHT"), timeout=LONG) as opened:
         assert opened.port == three[1].path
     with pytest.raises(contactfpga.PortNotFound, match=r"several boards answer with fingerprint .*: name:LEFT or name"):
@@ -154,7 +155,7 @@ def test_what_is_not_there_is_named_with_what_is(three):
 
 
 def test_a_search_writes_to_no_port(three):
-    """Not to boards, and not to whatever else has such a USB chip."""
+    """A search writes neither to boards nor to other devices with this USB chip."""
     with pytest.raises(contactfpga.PortNotFound):
         contactfpga.open("name:HEAD")
     assert [board.asked for board in three] == [0, 0, 0]
@@ -175,7 +176,8 @@ def test_a_search_does_not_disturb_an_open_board(three):
 
 
 def test_a_port_that_read_zones_keeps_open_goes_to_who_opens_it(board, monkeypatch):
-    """Nobody else can close that one, as in a notebook whose first cell reads zones."""
+    """`open` takes over a port that `read_zones` keeps open, as in a notebook whose first cell reads zones: users
+    cannot close that one themselves."""
     plug_in(monkeypatch, board)
     for port in (board.path, None):
         assert len(contactfpga.read_zones(port, LONG)) == 1

@@ -13,7 +13,7 @@ from contactfpga.wire import protocol
 FAST = contactfpga.Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5, release_us=1.0)
 
 
-def test_boards_that_read_pulses_are_told_by_clock_and_baud_rate():
+def test_boards_that_read_pulses_are_distinguished_by_clock_and_baud_rate():
     def pulsed(skin):
         (hello,) = [protocol.HelloReader().take(protocol.cobs_decode(protocol.encode_hello(skin)[1:-4]))]
         return hello.pulsed

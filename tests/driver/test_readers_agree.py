@@ -1,5 +1,5 @@
-"""A thread in C that reads a port says what a thread in Python says: the same events, counters and times on the same
-histories, whenever what came is taken."""
+"""The reading thread in C and the one in Python report the same events, counters and times of the same histories,
+whenever received bytes are taken."""
 
 import random
 
@@ -13,7 +13,7 @@ from wire import digits, seal
 import contactfpga
 from contactfpga.driver import native
 from contactfpga.driver.conversation import frames_in
-from contactfpga.driver.native import Unsettled
+from contactfpga.driver.native import NewestUnknown
 from contactfpga.errors import ContactFPGAError
 from contactfpga.wire.command import Command
 from contactfpga.zones.zone import Zones
@@ -38,8 +38,8 @@ def pairs():
         pair.close()
 
 
-def told(item):
-    """All that a user can see of what came."""
+def described(item):
+    """A frame or event as text, with all that a user can see of it."""
     if isinstance(item, Zones):
         return repr((item.to_dict(), sorted(item.flags), item.sheet, item.frame.heard, item.suspects))
     return repr(item)
@@ -69,13 +69,13 @@ class Side(History):
 
 
 def facts(link):
-    """What a board says of itself, and what is counted."""
+    """What a board says of itself, and the counters."""
     said = link.conversation
     history = said.units.history
     units = history and (history.count, history.lows, history.highs, history.last and history.last.sequence)
     with link.changed:
         silence = str(link.silence(0.0))
-    return repr((said.hello, said.lines.told, said.stats, sorted(said.numbers), link.last_s, units, silence))
+    return repr((said.hello, said.lines.reported, said.stats, sorted(said.numbers), link.last_s, units, silence))
 
 
 class Followers:
@@ -95,7 +95,7 @@ class Followers:
             case 0 | 1:
                 self.pop(self.rng.randrange(40))
             case 2 if not self.all_events:
-                first, second = ([told(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
+                first, second = ([described(zones) for zones in frames_in(queue.pop_frames())] for queue in self.queues)
                 assert first == second
                 self.seen += len(first)
             case 3 if not self.all_events:
@@ -115,7 +115,7 @@ class Followers:
     def pop(self, count):
         for _ in range(count):
             found = [queue.pop() for queue in self.queues]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             if found[0] is None:
                 return
             self.seen += 1
@@ -131,13 +131,13 @@ class Newest:
 
     def step(self):
         found = [self.taken(self.queues[0]), self.newest(self.links[1], self.queues[1])]
-        assert told(found[0]) == told(found[1])
+        assert described(found[0]) == described(found[1])
         self.seen += found[0] is not None
 
     def newest(self, link, queue):
         try:
             found = link._newest(queue)
-        except Unsettled:
+        except NewestUnknown:
             found = None
         if isinstance(found, Zones):
             self.shown += 1
@@ -148,7 +148,7 @@ class Newest:
         return self.taken(queue)
 
     def taken(self, queue):
-        """As :meth:`contactfpga.Board.latest` does."""
+        """Take received frames as :meth:`contactfpga.Board.latest` does."""
         try:
             queue.keep_last()
         except ContactFPGAError as error:
@@ -196,13 +196,13 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
             follower.step()
         for one in list(waiting):
             found = [look() for look in one]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             if found[0] is not None:
                 waiting.remove(one)
                 answered += 1
         if commanded is not None and rng.random() < 0.5:
             found = [look() for look in commanded]
-            assert told(found[0]) == told(found[1])
+            assert described(found[0]) == described(found[1])
             end_command(pair)
             commanded = None
         pair.now += rng.choice([0.001, 0.1, 0.1, 0.1, 0.1, 9.0])
@@ -221,7 +221,7 @@ def test_both_say_the_same_of_any_history(name, seed, pairs):
     ),
 )
 def test_times_and_newest_frames_are_the_same_of_a_board_at_its_pace(report, seed, pairs):
-    """With clocks that differ by as much as crystals do, reads that are late, hellos and requests."""
+    """Boards in real time, with clocks as far apart as crystals, late reads, hellos and requests."""
     rng = random.Random(f"{report} {seed}")
     pair, board = pairs(), ModelBoard(contactfpga.Skin(report=report))
     followers, newest = Followers(pair, rng, 100_000), Newest(pair)
@@ -253,14 +253,14 @@ def test_times_and_newest_frames_are_the_same_of_a_board_at_its_pace(report, see
     pair.pass_time()
     followers.pop(100_000)
     assert facts(pair.thread) == facts(pair.native)
-    assert [told(first()) for first, _ in looks] == [told(second()) for _, second in looks]
+    assert [described(first()) for first, _ in looks] == [described(second()) for _, second in looks]
     assert newest.seen > 300
     assert newest.shown > newest.seen // 2
     assert pair.thread.conversation.stats.frames > 3000
 
 
 def ask(pair, until):
-    """Both are asked; looks for the answers."""
+    """Request a frame on both links; returns what looks for the answers."""
     return [enlist(link, lambda said: said.ask(pair.now, until)) for link in pair.links]
 
 
@@ -307,7 +307,8 @@ def test_neither_shows_a_frame_after_a_restart_as_the_one_after_a_wrap(pairs):
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_reads_of_many_seconds_that_are_taken_together_say_the_same(pairs, asked):
-    """With a request that the board does not hear, which is sent again and again."""
+    """Many seconds of reads are taken at once, with a request that the board does not receive and that is sent again
+    and again."""
     pair, board = pairs(), ModelBoard(contactfpga.Skin())
     pair.take(board.hello() + board.frame())
     pair.pass_time()
@@ -323,7 +324,7 @@ def test_reads_of_many_seconds_that_are_taken_together_say_the_same(pairs, asked
 
 
 def test_frames_that_come_as_the_decoder_learns_of_their_sheet_are_not_lost(pairs, monkeypatch):
-    """In C they are no frames yet."""
+    """Packets that C receives while it learns of their sheet, and does not decode yet, still become frames."""
     pair, board = pairs(), ModelBoard(contactfpga.Skin())
     core, take = pair.native._core, pair.native._core.take
 
@@ -340,7 +341,8 @@ def test_frames_that_come_as_the_decoder_learns_of_their_sheet_are_not_lost(pair
 
 
 def test_what_the_ring_overwrites_counts_as_lost(pairs):
-    """As if the line had lost it; the newest frame is always there."""
+    """Frames that the full ring overwrites are counted as if the line had lost them; the newest frame is always
+    there."""
     pair, board = pairs(), ModelBoard(SKINS["moments"])
     queue = pair.native.queue(1_000_000, False)
     pair.take(board.hello() + board.frame())

@@ -1,4 +1,4 @@
-"""What `record=` writes, `replay://` reads."""
+"""`replay://` reads what `record=` writes."""
 
 import errno
 import time
@@ -84,7 +84,7 @@ def test_recording_that_does_not_exist():
 
 
 def test_doctor_of_a_recording_says_where_it_ends(tmp_path, capsys):
-    """It once printed that all was well and ended with status 1."""
+    """`doctor` of a recording names its end; it once printed that all was well and ended with status 1."""
     file, model = tmp_path / "frames.bin", ModelBoard(SKIN)
     file.write_bytes(model.hello() + b"".join(model.frame() for _ in range(30)))
     assert cli.main(["doctor", f"replay://{file}"]) == 0

@@ -24,15 +24,15 @@ LONG = 8
 
 
 def said(events):
-    """All that events tell, frame by frame."""
+    """The contents of events, frame by frame."""
     for event in events:
         if isinstance(event, Run):
-            yield from map(told, event)
+            yield from map(described, event)
         else:
             yield repr(event)
 
 
-def told(zones):
+def described(zones):
     frame = zones.frame
     arrays = tuple(
         None if one is None else (one.dtype, one.tolist()) for one in (frame.moments, frame.bitmap, frame.barycenters)
@@ -52,7 +52,7 @@ def told(zones):
     ),
 )
 def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng, monkeypatch):
-    """One side decodes in Python and takes each frame alone; the other decodes in C, where there is a library."""
+    """One side decodes in Python and takes each frame alone; the other decodes runs in C if there is a library."""
     in_runs, answered = 0, set()
     for turn in range(2):
         known = 0
@@ -88,15 +88,16 @@ def ends_of_single_frames(packets):
 
 
 def state(host, name):
-    """Of the times."""
+    """State of the times of a conversation."""
     state = {**vars(host._timeline)}
-    state["before"] = state["before"] and told(Zones(state["before"], SKINS[name].sheet))
+    state["before"] = state["before"] and described(Zones(state["before"], SKINS[name].sheet))
     del state["_stats"]
     return state
 
 
 def check_answers(alone, mixed, known):
-    """Of several frames none answers what the frame before them does not; what is answered at the end."""
+    """Check that each run answers what its frames alone do, and that a run of several frames answers nothing new.
+    Returns the last answer."""
     answers = [run.answers for run in alone if isinstance(run, Run)]
     for run in mixed:
         if isinstance(run, Run):
@@ -109,7 +110,7 @@ def check_answers(alone, mixed, known):
 
 @pytest.mark.parametrize("name", SKINS)
 def test_a_batch_holds_what_its_frames_hold(name, rng):
-    """Whether they came in runs or one by one."""
+    """A batch equals its frames, whether they came in runs or one by one."""
     board = ModelBoard(SKINS[name])
     stream = board.hello() + b"".join(random_frame(board, rng) for _ in range(400))
     runs = [event for event in Conversation("x").receive(stream, 1.5) if isinstance(event, Run)]
@@ -130,7 +131,7 @@ def test_a_batch_holds_what_its_frames_hold(name, rng):
 
 
 def runs_and_errors(rng, count):
-    """What a queue may get."""
+    """Events that a queue may get: runs of frames, and errors."""
     board = ModelBoard(SKINS["moments"])
     host = Conversation("x")
     host.receive(board.hello(), 0.0)
@@ -147,7 +148,8 @@ def times(items):
 
 @pytest.mark.parametrize("maxsize", [1, 7, 10_000])
 def test_a_frame_that_was_shown_comes_no_more_nor_do_those_before_it(maxsize, rng):
-    """Whether it waits already or is yet to come."""
+    """A frame that a program got as the newest is not delivered again, nor are earlier ones, waiting or still to
+    come."""
     queue, plain, came, seen = FrameQueue(maxsize, came=5), [], 5, 5
     for item in runs_and_errors(rng, 300):
         if isinstance(item, Exception):

@@ -15,13 +15,13 @@ from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
 from contactfpga.driver.finding import Candidate
 from contactfpga.tools.cli import main
-from contactfpga.wire.numbered import numbered, sheet_of, unnumbered
+from contactfpga.wire.sheet_number import numbered, sheet_of, unnumbered
 
 SKINS = (Skin(name="chest", row_drive="74hc595", column_read="74hc165"), Skin(name="back", rows=9, columns=7))
 
 
 class Sheet(DirectPort):
-    """One of the sheets; its packets say no number yet."""
+    """One of the sheets on a port; its packets have no number yet."""
 
     def __init__(self, number, skin):
         super().__init__(skin)
@@ -88,7 +88,7 @@ def opened(line, number, baud=3_000_000):
 
 
 def test_threads_that_wait_for_their_sheets_all_get_their_frames(line):
-    """While another one opens and closes them."""
+    """Each thread gets its sheet's frames while another thread opens and closes sheets."""
     boards = [opened(line, number) for number in (0, 1)]
     found, done = [[], []], threading.Event()
 

@@ -15,7 +15,7 @@ REPORTS = ("moments", "barycenter", "cells")
 
 
 def full(skin):
-    """As many zones as the sheet can hold, of a cell each: (area, sum x, sum y), in the report's units."""
+    """Zones of a full frame, of a cell each: (area, sum x, sum y), in the report's units."""
     if skin.connectivity == 8:
         cells = itertools.product(range(0, skin.rows, 2), range(0, skin.columns, 2))
     else:

@@ -75,9 +75,9 @@ def test_silence_is_an_error_that_says_how_long_and_what_came_last(board, port):
     for _ in range(2):
         with pytest.raises(
             contactfpga.NoData, match=r"no data for 0\.\d+ s, the last was frame .*not one byte"
-        ) as told:
+        ) as caught:
             frames.next()
-    silence = told.value.silence
+    silence = caught.value.silence
     assert silence.last.sequence == last.sequence
     assert silence.seconds == pytest.approx(0.1, abs=0.02), "it goes on"
     port.noisy = True
@@ -163,7 +163,8 @@ def test_a_frame_that_waits_too_long_is_not_the_latest(board, port):
 
 
 def test_a_frame_that_waited_on_its_way_is_not_the_latest(board, port):
-    """As after a network, or this program, stood still: it came just now, and was scanned long ago."""
+    """After the network or this program stood still, a frame that has just come but was scanned long ago is not the
+    latest."""
     for _ in range(10):
         board.next()
     late, port.dead = port.frame(), True
@@ -195,9 +196,9 @@ def test_where_the_clock_jumped_and_no_frame_waited_the_answer_to_a_request_show
 
 def test_the_timeout_may_be_shorter_than_the_deadline(board, port):
     port.dead = True
-    with pytest.raises(contactfpga.ReadTimeout) as told:
+    with pytest.raises(contactfpga.ReadTimeout) as caught:
         board.subscribe(deadline_s=10.0).next(timeout=0.05)
-    assert not isinstance(told.value, contactfpga.NoData)
+    assert not isinstance(caught.value, contactfpga.NoData)
 
 
 @pytest.mark.parametrize("deadline_s", [0, -1, float("nan"), float("inf"), "1"])
@@ -210,7 +211,8 @@ def test_deadlines_that_cannot_be(board, deadline_s):
 
 
 def test_with_a_keep_alive_the_deadline_has_to_be_longer():
-    """With its Skin known by what that says, else by the longest that there is."""
+    """A deadline below the keep-alive is refused: with a known Skin by its keep-alive, otherwise by the longest that
+    there is."""
     skin = contactfpga.Skin(send="on_change", keep_alive_ms=20.0)
     for given, least_s in ((skin, 0.02), (None, 0.1)):
         with contactfpga.open(Ticking(skin), given) as board:

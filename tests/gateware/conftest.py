@@ -25,7 +25,7 @@ def benches():
 
 @pytest.fixture
 def soon(monkeypatch):
-    """Line reversal checks a sheet at rest every 32 us, and renews what is told every 256 us."""
+    """Line reversal checks a sheet at rest every 32 us, and renews what is reported every 256 us."""
     from reversal import checked_soon
 
     checked_soon(monkeypatch)

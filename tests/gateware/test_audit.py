@@ -45,7 +45,7 @@ def random_frame(rng, rows, columns):
 
 @dataclasses.dataclass
 class Schedule:
-    """When rows are taken and records may be offered; the end mark comes three clocks after the last row."""
+    """Cycles in which rows are taken and records may be offered; the end mark comes three clocks after the last row."""
 
     rows: dict  # cycle: (word, last)
     records: list  # (not before this cycle, moments or None for an end mark)
@@ -80,7 +80,7 @@ def record_word(zone, rows, columns):
 
 
 def run(bench, dut, plan, sheet, rng, ready=None):
-    """Puts the plan through; returns the items' sink, the records' source, and a summary for each end mark."""
+    """Feed the plan to the audit; returns the items' sink, the records' source, and a summary for each end mark."""
     rows, columns = sheet
     sim = bench(dut)
     noise = [rng.randrange(2 << columns) for _ in range(17)]

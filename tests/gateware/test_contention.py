@@ -1,4 +1,4 @@
-"""Lines that are driven against each other are told, by each sheet that the gateware is simulated with."""
+"""Lines that are driven against each other are reported, by each sheet that the gateware is simulated with."""
 
 import dataclasses
 
@@ -68,7 +68,8 @@ def test_a_driven_column_and_a_selected_row_meet_in_a_pressed_switch_only():
 
 @pytest.mark.parametrize("diodes", ["col2row", "row2col"])
 def test_rows_that_are_let_go_show_driven_columns_through_pressed_switches(diodes):
-    """All others are at the level of their pulls; a stuck column feeds none."""
+    """Released rows read the level of driven columns through pressed switches, others that of their pulls; a stuck
+    column feeds none."""
     skin = small(rows=4, columns=4, diodes=diodes)
     matrix = Matrix(skin)
     matrix.press([0b0001, 0b0110, 0, 0b1000], np.array([False, False, True, False]))

@@ -35,7 +35,7 @@ def skin_of(rows, columns, method, press, release):
 
 
 def debounced(method, press, release, samples):
-    """What one switch counts as after each of its samples."""
+    """Level that one switch counts as after each of its samples."""
     out, state, run, ignored = [], 0, 0, 0
     for sample in samples:
         if method == "sym_defer_pk":
@@ -114,7 +114,7 @@ UNEVEN = Skin(rows=3, columns=4, clock_hz=12_000_000, report="cells", scan="reve
 
 
 def timed(method, press, release, samples):
-    """What one switch counts as, and whether a time is running, after each of its samples (time, level)."""
+    """Level that one switch counts as, and whether a time is running, after each of its samples (time, level)."""
     out, state, since, ignored_from = [], 0, None, None
     for now, level in samples:
         if ignored_from is not None and now - ignored_from < press:
@@ -170,7 +170,7 @@ def packed(levels):
 @pytest.mark.whole
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("press", "release"), [(0, 0), (0, 3), (2, 0), (2, 4)])
-def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told(rng, method, press, release):
+def test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_reported(rng, method, press, release):
     """Each row is driven alone, at times of its own; the times of the rule are those of docs/timing.md."""
     times = [us + 1 if us else 0 for us in (press, release)]
     skin = UNEVEN.replace(debounce=method, debounce_press_us=press, debounce_release_us=release)

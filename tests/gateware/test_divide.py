@@ -109,7 +109,7 @@ def spread(zones):
 
 
 def check_items(wanted, taker):
-    """Each item's bits; of an end mark only that it is one."""
+    """Check each item's bits; of an end mark only that it is one."""
     size = next(item for item in wanted if item)[1]
     got = [word for _, word in taker.transfers]
     assert [word >> 8 * size for word in got] == [int(item is None) for item in wanted]
@@ -150,7 +150,8 @@ def test_every_zone_of_a_small_sheet_is_rounded_exactly_and_takes_its_clocks(
 @pytest.mark.parametrize("size", [16, 32, 64])
 @pytest.mark.parametrize("bits", [0, 4, 8])
 def test_zones_at_the_edge_of_rounding_on_large_sheets(bench, rng, size, bits):
-    """Sums just below, at and above half a step, for areas small, large and next to a power of two."""
+    """Division is exact for sums just below, at and above half a step, and areas small, large and next to a power of
+    two."""
     oracle = Oracle(size, size, bits)
     cells, zones = size * size, {(size * size, size * sum(range(size)), size * sum(range(size)))}
     for area in (1, 2, 3, size - 1, size, size + 1, cells // 2 - 1, cells // 2, cells // 2 + 1, cells - size):
@@ -176,7 +177,8 @@ def test_nothing_is_lost_or_changed_by_gaps_and_stalls(bench, rng, stage, gap, s
 
 
 def cycles_by_the_rule(oracle, words, put, size):
-    """When items are taken by a packer that takes ``size`` clocks for each, and from when on each was offered."""
+    """Cycles in which items are taken by a packer that takes ``size`` clocks for each, and from which each was offered,
+    by the rule."""
     taken, offered, free, gone, packer = [], [], 0, 0, 0
     for word, at in zip(words, put, strict=True):
         if word == oracle.end:
@@ -206,7 +208,7 @@ def test_a_queue_and_a_division_take_their_clocks_before_a_packer_of_any_speed(b
     waited = 0
 
     def reads(_cycle, seen):
-        """As the packer: an item is taken with its last byte, an end mark at once."""
+        """Takes items as the packer does: an item with its last byte, an end mark at once."""
         nonlocal waited
         valid, end = seen & 1, seen >> 1
         takes = valid and (end or waited == size - 1)

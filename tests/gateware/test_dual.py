@@ -78,7 +78,7 @@ def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, f
 
 
 class Copy(Top):
-    """Only the ports of the gateware: ``said`` are the bits of its outputs, ``heard`` those of its inputs."""
+    """A copy with only the gateware's ports: ``said`` are the bits of its outputs, ``heard`` those of its inputs."""
 
     def __init__(self, skin):
         super().__init__(skin, copy=True)
@@ -136,7 +136,8 @@ def test_each_bit_at_each_pin_is_compared_and_heard_by_both(name):
 @pytest.mark.campaign
 @pytest.mark.parametrize("labeller", ["run", "serial"])
 def test_synthesis_keeps_both(labeller):
-    """Of two copies in lockstep it merges one register in seven. Logic without registers may be shared."""
+    """Yosys keeps the registers of both copies, of which it would merge one in seven if they ran in the same clock.
+    Logic without registers may be shared."""
     skin = Skin(labeller=labeller, dual=True)
     copies = (lambda: Top(skin, copy=True), lambda: Top(skin))
     (one_luts, one_flip_flops, _), (luts, flip_flops, _) = (sizes.counts(make, sizes.UP5K) for make in copies)

@@ -88,8 +88,8 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
 
 
-def told_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
-    """What the scanner tells of its lines in each cycle."""
+def reported_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
+    """The scanner's fault word in each cycle."""
     dut = Scanner(skin)
     sim, sheet = bench(dut), InputDriver(skin, timeline)
     watched = sim.watch(dut.faults)
@@ -105,7 +105,7 @@ def told_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
 
 
 def changes(words) -> list[tuple[int, int]]:
-    """Those of (cycle, word) that differ from the one before; the first one from 0."""
+    """The (cycle, word) pairs that differ from the one before; the first is compared with 0."""
     found, before = [], 0
     for cycle, word in words:
         if word != before:
@@ -116,26 +116,26 @@ def changes(words) -> list[tuple[int, int]]:
 
 def golden(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
     frames = cycles // facts(skin).scan_clocks + 1
-    told = [change for frame in checks(facts(skin), timeline, frames) for change in frame]
-    return [change for change in changes(told) if change[0] < cycles]
+    reported = [change for frame in checks(facts(skin), timeline, frames) for change in frame]
+    return [change for change in changes(reported) if change[0] < cycles]
 
 
 @pytest.fixture
 def soon(monkeypatch):
-    """What is told is renewed every 512 us."""
+    """Reports of faulty lines are renewed every 512 us."""
     monkeypatch.setattr(raster, "RETRY_BIT", 9)
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
 
 
 @pytest.mark.parametrize("name", sample(SKINS, quick=["precharged", "two chains", "masked"]))
-def test_what_is_told_of_lines_is_the_golden_models_in_every_clock(bench, soon, name):
+def test_what_is_reported_of_lines_is_the_golden_models_in_every_clock(bench, soon, name):
     skin = SKINS[name]
     timeline, cycles = events(skin, 3 + len(name), 80), max(60 * facts(skin).scan_clocks, 4_000)
     expected = golden(skin, timeline, cycles)
-    assert changes(enumerate(told_words(skin, timeline, cycles, bench))) == expected
+    assert changes(enumerate(reported_words(skin, timeline, cycles, bench))) == expected
     assert len(expected) > 8
     ended = [word & ~later for (_, word), (_, later) in itertools.pairwise(expected)]
-    assert any(ended), "nothing was told no more"
+    assert any(ended), "no report ended"
 
 
 RETRY_BIT = 7
@@ -143,8 +143,9 @@ BREAKS = Skin(rows=3, columns=4, report="cells", settle_us=10, release_us=2, **T
 
 
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
-def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
-    """Whatever is pressed. Cut in any clock of a frame; mended, and told no more after the clock toggles next."""
+def test_each_single_break_at_each_place_is_reported_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
+    """Any switches may be pressed. Each line is cut in any clock of a frame, then mended, and its report ends after the
+    clock toggles next."""
     monkeypatch.setattr(raster, "RETRY_BIT", RETRY_BIT)
     skin, rng = BREAKS.replace(diodes=diodes), np.random.default_rng(7)
     frame, retry = facts(skin).scan_clocks, 1 << RETRY_BIT
@@ -154,7 +155,7 @@ def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_e
     cuts += [(start + 2 * frame, Cuts()) for start in at]
     cycles = len(at) * spacing
     pieces = [(start, rng.random((3, 4)) < rng.random(), None) for start in range(0, cycles, frame // 2)]
-    words = told_words(skin, Timeline(pieces, cuts=sorted(cuts, key=lambda cut: cut[0])), cycles, bench)
+    words = reported_words(skin, Timeline(pieces, cuts=sorted(cuts, key=lambda cut: cut[0])), cycles, bench)
     for start, (cut, wanted) in zip(at, breaks(3, 4), strict=True):
         meanwhile = words[start : start + spacing - frame]
         assert {word | wanted for word in meanwhile} == {wanted}, cut
@@ -162,18 +163,19 @@ def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_e
         assert words[start + 4 * frame + retry + 3] == 0, cut
 
 
-def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, rng):
+def test_a_whole_sheet_is_never_reported_whatever_is_pressed(bench, rng):
     skin = Skin(rows=2, columns=3, report="cells", settle_us=10, release_us=2, **TINY)
     frame = facts(skin).scan_clocks
     every = [np.array([number >> bit & 1 for bit in range(6)], bool).reshape(2, 3) for number in range(64)]
     pieces = [(number * frame, cells, None) for number, cells in enumerate(every)]
     start = len(every) * frame
     pieces += [(clock, every[rng.randrange(64)], None) for clock in range(start, start + 20 * frame, 5)]
-    assert set(told_words(skin, Timeline(pieces), start + 20 * frame, bench)) == {0}
+    assert set(reported_words(skin, Timeline(pieces), start + 20 * frame, bench)) == {0}
 
 
-def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
-    """Checks, rounds and turns at random, many in the same clock; against what the checks were, looked up."""
+def test_what_is_reported_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
+    """Checks, rounds and toggles at random, many in the same clock, against reports looked up in the history of
+    checks."""
     skin, cycles = SKINS["masked"], 6_000
     rows, columns = skin.rows, skin.columns
     ports = {"rows": rows, "columns": columns, "stuck": columns + 1, "checks_rows": rows, "checks_columns": 1,
@@ -201,11 +203,11 @@ def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
     lines += [("stuck", column, given["checks_stuck"].__getitem__) for column in range(columns + 1)]
     masked = {("rows", 0), ("columns", 1), ("stuck", 1)}
     for place, (name, line, is_checked) in enumerate(lines):
-        told, expected = 0, []
+        reported, expected = 0, []
         for cycle in range(cycles - 1):
-            expected.append(told)
+            expected.append(reported)
             if is_checked(cycle):
-                kept = told and round_of[cycle] not in renewing
-                told = int((given[name][cycle] >> line & 1 or kept) and (name, line) not in masked)
+                kept = reported and round_of[cycle] not in renewing
+                reported = int((given[name][cycle] >> line & 1 or kept) and (name, line) not in masked)
         assert [word >> place & 1 for word in words.values] == expected, (name, line)
         assert sum(expected) > 0.05 * cycles or (name, line) in masked

@@ -46,7 +46,7 @@ def label(bench, frames, rule, rng=None, gap=0.0, stall=0.0):
 
 
 def check(bench, frames, *rule):
-    """Every row, record and end mark in the very cycle of the golden rule."""
+    """Check that every row, record and end mark is in the cycle of the golden rule."""
     start, rows, wanted = 0, [], []
     for cells in frames:
         work = labelling(cells, *rule)
@@ -67,7 +67,7 @@ def test_shapes_that_break_labellers_come_out_in_their_cycles(bench, connectivit
 
 @RULE
 def test_frames_of_three_rows_and_columns_come_out_in_their_cycles(bench, connectivity, labeller, closed):
-    """Every fifth one; the compiled labellers take all of 4x4."""
+    """Every fifth frame of 3x3 cells, record by record with its cycle; the compiled labellers take all of 4x4."""
     check(bench, every_frame(3, 3)[connectivity // 4 :: 5], connectivity, labeller, closed)
 
 

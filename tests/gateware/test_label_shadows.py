@@ -16,7 +16,7 @@ QUICK_BENCHES = [(labeller, QUICK_SIZES[1]) for labeller in LABELLERS]  # each h
 
 
 def frames_of(rows, columns, count=400):
-    """Of 4x4 every third; else shapes that break labellers, and noise of every density."""
+    """Frames of a sheet: every third one of 4x4, otherwise shapes that break labellers, and noise of every density."""
     if (rows, columns) == (4, 4):
         return (np.arange(0, 1 << 16, 3)[:, None] >> np.arange(16) & 1).astype(bool).reshape(-1, 4, 4)
     rng = np.random.default_rng(rows * 100 + columns)

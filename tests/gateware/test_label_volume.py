@@ -45,7 +45,7 @@ def check(bench, frames, gap=0, stall=0):
 
 
 def check_bounds(skin, frames, clocks):
-    """Those that docs/timing.md states for the clocks from the last row to the last record."""
+    """Check the bounds of docs/timing.md for the clocks from the last row to the last record."""
     columns = frames.shape[2]
     assert clocks.max() <= skin.derived.label_clocks - 1
     if skin.closed:

@@ -62,7 +62,7 @@ def hello_of(skin, digits=(0,) * 16):
 
 
 def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, after=400):
-    """Puts the frames through; returns the bytes' sink and the items' source."""
+    """Feed the frames to the link; returns the bytes' sink and the items' source."""
     dut, sim = bench_of_skin
     size = ITEM_BYTES[skin.report]
     words = [word for frame in frames for word in (*frame.items, 1 << 8 * size)]
@@ -217,14 +217,14 @@ def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
         asked = {40 * index + 20 for index in (2, 127, 128, 129, 255, 256, 257, 298)}
         sink = run((dut, sim), dut.skin, frames, lambda cycle: True, asked)
     packets, _ = packets_of(sink)
-    sent = told = 0
+    sent = reported = 0
     for begun, packet in packets:
         if packet[0] == 0:
             assert packet == hello_sent(dut.skin, sink, begun, sent)
-            told = max(told, sent)
+            reported = max(reported, sent)
         else:
             sent += 1
-    assert told > 128
+    assert reported > 128
 
 
 def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
@@ -232,26 +232,26 @@ def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
     sim = bench(dut)
     sim.drive(dut.epoch, lambda cycle: int(cycle in epochs))
     asked = {100, 400, 3000, 6000, 6500}
-    while_told = {150, 450, 3050, 6001, 6500, 6550}  # one per hello can wait
-    epochs = {cycle for cycle in range(300, 6500, 40) if not any(0 <= cycle - at < 200 for at in asked)} | while_told
+    while_sent = {150, 450, 3050, 6001, 6500, 6550}  # one per hello can wait
+    epochs = {cycle for cycle in range(300, 6500, 40) if not any(0 <= cycle - at < 200 for at in asked)} | while_sent
     frame = Frame([], dict.fromkeys(TAG | SUMMARY, 0), [1])
     sink = run((dut, sim), dut.skin, [frame], lambda cycle: True, asked, after=7200)
     packets, _ = packets_of(sink)
-    told = []
+    reported = []
     for begun, packet in packets:
         if packet[0] == 0:
             digits = packet[16 + 7 : 16 + 11]
             taken = begun - 2
-            told.append((taken, sum((digit & 127) << 7 * place for place, digit in enumerate(digits))))
-    assert len(told) == 6
-    for taken, epoch in told:
+            reported.append((taken, sum((digit & 127) << 7 * place for place, digit in enumerate(digits))))
+    assert len(reported) == 6
+    for taken, epoch in reported:
         assert epoch == sum(cycle < taken for cycle in epochs), taken
-    assert told[-1][1] > 128
+    assert reported[-1][1] > 128
 
 
 def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng):
-    """Of a scan that waits. Turns of the clock's bit come in any clock, most of them as it is decided whether a frame
-    is sent; the first frame is."""
+    """Link of a scan that waits: the clock's bit toggles in any clock, mostly as it is decided whether a frame is sent;
+    the first frame is sent."""
     skin, cycles = Skin(scan="reversal", precharge_us=1.0, send="on_change", keep_alive_ms=6.0), 6_000
     decide = [int(rng.random() < 0.2) for _ in range(cycles)]
     wanted = {name: [int(rng.random() < 0.03) for _ in range(cycles)] for name in ("changed", "requested")}
@@ -291,7 +291,7 @@ def test_readings_go_after_each_four_frames_that_follow_one_another(bench):
 
 
 def test_carries_that_come_in_one_clock_are_both_counted(bench):
-    """Those of the frames sent and of the epoch, through a carry into a second digit."""
+    """Carries of the sent frames and of the epoch in the same clock, through a second digit, are both counted."""
     dut, count = odometer.Odometer(), 130
     sim = bench(dut)
     for pulses in (dut.sent, dut.epoch):

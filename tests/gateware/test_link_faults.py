@@ -25,13 +25,14 @@ BYTE = 20  # clocks
 
 
 def report_of(name, word):
-    """As docs/protocol.md has it."""
+    """A fault report as docs/protocol.md describes it."""
     skin = SKINS[name]
     return seal(digits(word, -(-BITS[name] // 7)) + b"\x90", facts(skin).fingerprint[:2])
 
 
 def random_words(rng, cycles, bits, spacing):
-    """(cycle, word) of every change: single lines, several at once, there and back within some clocks."""
+    """Random fault words as (cycle, word) of every change: single lines, several at once, there and back within some
+    clocks."""
     changes, cycle, word = [(0, 0)], 0, 0
     while cycle < cycles:
         cycle += rng.choice([1, 2, 5, spacing, 3 * spacing])
@@ -42,10 +43,10 @@ def random_words(rng, cycles, bits, spacing):
 
 def predicted(skin, frames, changes, asked, cycles):
     """The golden model's bytes."""
-    told = faults.FaultHistory()
+    reported = faults.FaultHistory()
     for cycle, word in changes[1:]:
-        told.change(cycle, word)
-    link = Link(facts(skin), State(facts(skin), [], Reception([], [])), told)
+        reported.change(cycle, word)
+    link = Link(facts(skin), State(facts(skin), [], Reception([], [])), reported)
     decided = [taken for taken, _ in decisions(skin, frames, None)]
     period = facts(skin).hello_scans
     for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[period - 1 :: period])]):
@@ -66,7 +67,7 @@ def paced(sim, port):
 
 
 def held(changes):
-    """What (cycle, word) pairs set and hold, cycle by cycle; 0 before."""
+    """The word that (cycle, word) pairs set, cycle by cycle; 0 before the first."""
     words, word = dict(changes), 0
 
     def now(cycle):
@@ -78,7 +79,7 @@ def held(changes):
 
 
 def feed(sim, dut, frames, changes, asked=()):
-    """Puts frames, faults and wishes for a hello through."""
+    """Feeds frames, fault words and requests for a hello to the link."""
     words = [word for frame in frames for word in (*frame.items, 1 << 16)]
     source = sim.source(dut.items, words, not_before=[at for frame in frames for at in frame.not_before])
     ends = [index for index, word in enumerate(words) if word >> 16]
@@ -118,8 +119,8 @@ def test_reports_frames_and_hellos_go_out_in_the_model_s_cycles(guarded, rng):
     assert kinds.count(9) > 3
 
 
-def test_after_a_hello_and_after_a_change_the_word_itself_is_told(guarded, rng):
-    """And nothing is told over and over while nothing changes."""
+def test_after_a_hello_and_after_a_change_the_word_itself_is_reported(guarded, rng):
+    """A hello and a change are each followed by a report of the word; without a change no report is repeated."""
     dut, sim = guarded
     words = [rng.randrange(1 << 13) for _ in range(4)]
     changes = [(0, 0), *((5000 + 500 * index, word) for index, word in enumerate(words))]
@@ -128,14 +129,14 @@ def test_after_a_hello_and_after_a_change_the_word_itself_is_told(guarded, rng):
     sink = paced(sim, dut.bytes)
     sim.run(10_000)
     packets, _ = packets_of(sink)
-    told = [packet for _, packet in packets if packet[-5] == 0x90]
-    assert told == [report_of("guard", word) for word in (0, 0, *words, words[-1])]
+    reported = [packet for _, packet in packets if packet[-5] == 0x90]
+    assert reported == [report_of("guard", word) for word in (0, 0, *words, words[-1])]
     kinds = [packet[-5] >> 4 for _, packet in packets]
     assert all(after == 9 for kind, after in itertools.pairwise(kinds) if kind == 4)
 
 
 def test_a_word_that_never_rests_does_not_keep_frames_from_the_wire(guarded, rng):
-    """Every other packet at least is a frame, as long as one waits."""
+    """While the fault word changes all the time, at least every other packet is a frame as long as one waits."""
     dut, sim = guarded
     frames = random_frames(rng, dut.skin, 40)
     cycles = frames[-1].not_before[-1]
@@ -157,7 +158,7 @@ def test_a_word_that_never_rests_does_not_keep_frames_from_the_wire(guarded, rng
 
 @pytest.mark.parametrize("name", ["both", "self-test"])
 def test_slots_of_the_self_test_go_out_whole_and_are_acknowledged(bench, rng, name):
-    """Whatever the wire does; reports come first, and nothing is lost."""
+    """Slots are whole and none is lost, whatever the wire does; fault reports go first."""
     skin = SKINS[name]
     dut = PackerAndLink(skin)
     sim = bench(dut)

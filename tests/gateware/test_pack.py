@@ -52,7 +52,7 @@ class Frame:
 
 
 def overwritten_width(area, zones):
-    """What is left up to whole bytes, four bits at least."""
+    """Bits of the count of overwritten frames: those left up to whole bytes, at least four."""
     counted = 24 + 8 + 3 + area + zones
     return next(width for width in range(4, 12) if (counted + width) % 8 == 0)
 
@@ -88,7 +88,7 @@ def random_items(rng, size, count, zeros):
 
 
 def run(bench, skin, frames, rng, gap=0.0):
-    """Packs the frames; returns for each one sent (bytes, cycle of commit), the items' source, and the verdicts."""
+    """Pack the frames; returns for each sent one (bytes, cycle of commit), the items' source, and the verdicts."""
     size = sizes(skin)[0]
     dut = Packer(skin, OFFSET_BITS)
     sim = bench(dut)
@@ -125,7 +125,7 @@ def run(bench, skin, frames, rng, gap=0.0):
 
 
 class Memory:
-    """What the packer writes."""
+    """Memory that the packer writes."""
 
     def __init__(self, sim, dut):
         self._watched = [

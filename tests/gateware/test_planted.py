@@ -31,7 +31,7 @@ class Fault(NamedTuple):
 GATEWARE = "tests/gateware"
 FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
 FAULTS = {
-    "readings go out with a report": Fault("link/between.py",
+    "readings go out with a report": Fault("link/other_packets.py",
         "hello_due | self._wire.take_report | frame_waits & ~units_next", "hello_due | frame_waits & ~units_next",
         f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says"),
     "a sweep's region is written as it goes out": Fault("units/pack.py",
@@ -45,7 +45,7 @@ FAULTS = {
     "a column is let go for one sample": Fault("scan/precharge.py", "low & self.columns | kept", "self.columns | kept",
         f"{GATEWARE}/test_wrong_readings.py::test_at_rest_a_wrong_reading_delays_contact_by_no_more_than_it_lasts"),
     "a stuck column is never tried": Fault("scan/precharge.py", "tries.eq(asked)", "tries.eq(0)",
-        f"{GATEWARE}/test_reversal_scanner.py::test_a_stuck_column_is_told_and_not_driven_until_it_is_tried"),
+        f"{GATEWARE}/test_reversal_scanner.py::test_a_stuck_column_is_reported_and_not_driven_until_it_is_tried"),
     "a try ends too soon": Fault("scan/precharge.py",
         "count.eq(count + (self.looks | ~count[: self.apart_bits].all()))",
         "count.eq(Mux(toggles, 60, count + (self.looks | ~count[: self.apart_bits].all())))",
@@ -55,11 +55,11 @@ FAULTS = {
         f"{GATEWARE}/test_output_pins.py::test_each_pin_of_several_sheets_comes_from_a_register"),
     "a test keeps the finding of the one before": Fault("scan/self_test.py", "found.eq(bad | found & ~first)",
         "found.eq(bad | found)",
-        f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other"),
+        f"{GATEWARE}/test_self_test.py::test_what_is_reported_follows_from_each_slot_of_one_test_after_the_other"),
     "a line that rises by itself follows others": Fault("scan/self_test.py", " & ~line & ~rises)", " & ~line)",
-        f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other"),
+        f"{GATEWARE}/test_self_test.py::test_what_is_reported_follows_from_each_slot_of_one_test_after_the_other"),
     "a row that rises with a column is bad": Fault("scan/self_test.py", "rows.any() & ~columns.any()", "rows.any()",
-        f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other"),
+        f"{GATEWARE}/test_self_test.py::test_what_is_reported_follows_from_each_slot_of_one_test_after_the_other"),
     "a long precharge is cut": Fault("scan/reversal_cycle.py",
         "min(charge - 1, charge - derived.precharge_clocks + self._listened)", "charge - 1",
         f"{GATEWARE}/test_reversal.py::test_gateware_does_what_the_golden_model_says_and_frames_are_true"),
@@ -76,10 +76,10 @@ FAULTS = {
         f"{GATEWARE}/test_reversal_guard.py::test_checks_at_rest_wait_for_a_turn_after_the_check_of_a_frame"),
     "a toggle in a round's last clock is lost": Fault("scan/guard.py", "renewing.eq(toggled | toggles)",
         "renewing.eq(toggled)",
-        f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well"),
+        f"{GATEWARE}/test_guard.py::test_what_is_reported_is_kept_until_a_renewing_round_finds_it_well"),
     "a toggle in a round's last clock counts twice": Fault("scan/guard.py",
         "renewing.eq(toggled | toggles), toggled.eq(0)]", "renewing.eq(toggled | toggles), toggled.eq(toggles)]",
-        f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well"),
+        f"{GATEWARE}/test_guard.py::test_what_is_reported_is_kept_until_a_renewing_round_finds_it_well"),
     "a clock early is not early": Fault("scan/sample_at.py", "self.early.eq(asked != settle)",
         "self.early.eq(asked < settle - 1)",
         f"{GATEWARE}/test_sample_at.py::test_a_frame_takes_the_last_clock_that_was_asked_for_before_it_begins"),
@@ -89,7 +89,7 @@ FAULTS = {
     "what was well in a fault counts": Fault("link/alive.py", "(seen & ~ticks | self.well) & ~self.fault",
         "(seen & ~ticks & ~self.fault) | self.well",
         f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick"),
-    "frames between readings are not counted anew": Fault("link/between.py", "[self._frames.eq(0), ", "[",
+    "frames between readings are not counted anew": Fault("link/other_packets.py", "[self._frames.eq(0), ", "[",
         f"{GATEWARE}/test_link.py::test_readings_go_after_each_four_frames_that_follow_one_another"),
     "one carry of two is lost": Fault("link/odometer.py", "epoch_waits.eq(epoch_waits & sent_waits)",
         "epoch_waits.eq(0)", f"{GATEWARE}/test_link.py::test_carries_that_come_in_one_clock_are_both_counted"),
@@ -102,7 +102,7 @@ FAULTS = {
     "the highest bit of the kind is ignored": Fault("link/request.py", "with m.If(bit >= protocol.FLAG_BITS):",
         "with m.If((bit >= protocol.FLAG_BITS) & (bit != 7)):",
         f"{GATEWARE}/test_request.py::test_no_other_kind_is_taken"),
-    "a bit of the check is ignored": Fault("link/request.py", "return crc == 0", "return crc[:15] == 0",
+    "a bit of the check is ignored": Fault("link/request.py", "checked = crc == 0", "checked = crc[:15] == 0",
         f"{GATEWARE}/test_request.py::test_each_bit_that_a_wrong_check_leaves_counts"),
     "what the link finds does not restart the board": Fault("top.py", "scan.upset | link.upset", "scan.upset",
         f"{GATEWARE}/test_top.py::test_a_register_that_turns_by_itself_starts_all_but_the_transmitter_anew"),
@@ -113,7 +113,7 @@ FAULTS = {
         "scan.contact | fault | unwatched", f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says"),
     "units without a threshold are safe": Fault("top.py", "scan.contact | over | fault | unwatched",
         "scan.contact | over | fault", f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says"),
-    "a line that is told raises no contact": Fault("top.py",
+    "a line that is reported raises no contact": Fault("top.py",
         'scan.faults.as_value().any() if hasattr(scan, "faults") else 0', "0",
         f"{GATEWARE}/test_safe_pins.py::test_both_pins_are_the_golden_models_in_every_clock"),
     "a sheet at rest is not well": Fault("top.py", "scan.watched if self.derived.scan.waits else 0", "0",
@@ -136,14 +136,15 @@ FAULTS = {
     "the time of a row goes on in the debounce": Fault("debounce/timed.py",
         "        with m.If(enters):\n            m.d.sync += now.eq(self.now)\n",
         "        m.d.comb += now.eq(self.now)\n",
-        f"{GATEWARE}/test_debounce.py::test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_told"),
+        f"{GATEWARE}/test_debounce.py::test_samples_at_uneven_times_follow_the_rule_and_busy_rows_are_reported"),
 }  # fmt: skip
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_planted_fault_is_noticed(name, tmp_path):
-    """Its test belongs to `make test`. A test that cannot be collected, or does not end, has noticed nothing."""
+    """The named test, which belongs to `make test`, fails with the fault. A test that cannot be collected or does not
+    end has noticed nothing."""
     fault = FAULTS[name]
     copy = tmp_path / "contactfpga_hdl"
     shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -159,5 +160,5 @@ def test_a_planted_fault_is_noticed(name, tmp_path):
 
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_can_be_planted(fault):
-    """Its text is in the source, once."""
+    """The replaced text is in the source once."""
     assert fault.planted()

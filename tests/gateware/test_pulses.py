@@ -55,8 +55,8 @@ def test_the_encoder_and_the_models_agree():
 
 @pytest.mark.parametrize("error", [-0.02, 0.0, 0.02])
 def test_requests_are_taken_at_any_phase_with_jitter_and_clock_error(listen, rng, error):
-    """Each edge moved by up to 0.22 bits; what limits it is a one of 2 clocks, which must be seen, and so must the
-    line's rest between two bytes."""
+    """Each edge of a request is moved by up to 0.22 bits. The limit is a one of 2 clocks, which must be seen, as must
+    the line's rest between two bytes."""
     phases = 8
     for turn in range(phases):
         number, hello = rng.randrange(1, 1 << 21), rng.random() < 0.5
@@ -83,9 +83,9 @@ def test_any_bytes_are_read_as_the_golden_model_does(listen, rng):
             some = bytes(rng.choice([ONE, ZERO, ZERO, MARK]) for _ in range(rng.randrange(20)))
             data += rng.choice([whole, whole, whole[: rng.randrange(len(whole))], some, rng.randbytes(6)])
         found, numbers = listen(line(data, listen.bit))
-        told = heard([(IDLE, data)], listen.bit)
-        assert found == [(one.cycle, one.number, one.hello) for one in told.requests]
-        assert numbers == [told.number(cycle) for cycle in range(len(numbers))]
+        expected = heard([(IDLE, data)], listen.bit)
+        assert found == [(one.cycle, one.number, one.hello) for one in expected.requests]
+        assert numbers == [expected.number(cycle) for cycle in range(len(numbers))]
         total += len(found)
     assert total > 2
 
@@ -122,7 +122,7 @@ OTHERS = ([], [ONE], [ZERO], [MARK], [ONE, ZERO], [MARK, MARK])
 
 
 def test_no_single_wrong_pulse_makes_another_request(read):
-    """Every one replaced, left out and doubled, exhaustively."""
+    """Each pulse of a request is replaced, left out and doubled; none of these is another request."""
     assert read(SYMBOLS) == [SENT]
     symbols, count = [MARK], 0
     for place, other in itertools.product(range(len(SYMBOLS)), OTHERS):

@@ -1,4 +1,4 @@
-"""What the board takes for a request or a command among the bytes it receives."""
+"""Requests and commands that the board accepts among the bytes it receives."""
 
 from functools import partial
 
@@ -82,14 +82,15 @@ def sealed(plain):
 
 
 def moment(bytes_before):
-    """When the last of this many bytes is received."""
+    """Cycle in which the last of this many bytes is received."""
     return (bytes_before - 1) * BYTE + 2 + BIT // 2 + 9 * BIT
 
 
 @pytest.mark.parametrize("size", range(3, 9))
 @pytest.mark.parametrize("code", [1, 9])  # of a request, of a command
 def test_a_shorter_packet_with_a_check_that_leaves_nothing_is_not_taken(obey, code, size):
-    """After a request, whose kind is still known to fit."""
+    """A packet that is too short but leaves the CRC register at zero is ignored after a request, whose kind is still
+    stored as fitting."""
     shorter = bytes(range(code, code + size - 2))
     low, middle, high = check(shorter)
     shorter += (low & 0x7F | (middle & 0x7F) << 7 | (high & 3) << 14).to_bytes(2, "little")
@@ -98,7 +99,8 @@ def test_a_shorter_packet_with_a_check_that_leaves_nothing_is_not_taken(obey, co
 
 
 def test_any_bytes_hold_the_requests_that_a_reader_of_whole_packets_finds(listen, rng):
-    """Also what comes before the first delimiter, and flags without a meaning."""
+    """Random bytes hold the requests that a reader of whole packets finds, also before the first delimiter, and with
+    flags without a meaning."""
     total = 0
     for turn in range(6):
         data = sealed(plain(9)) if turn % 2 else b"\0"
@@ -122,7 +124,7 @@ def test_any_bytes_hold_the_requests_that_a_reader_of_whole_packets_finds(listen
 
 
 def agrees(packet):
-    """In the bits of the CRC."""
+    """Whether the packet's check is the CRC of its bytes, in the bits that the CRC has."""
     return all((a ^ b) & mask == 0 for a, b, mask in zip(check(packet[:5]), packet[5:], (0x7F, 0x7F, 3)))
 
 
@@ -167,7 +169,8 @@ def test_what_is_neither_request_nor_command_is_passed_over_and_the_next_one_tak
 
 
 def test_no_flip_of_a_bit_makes_another_command(obey):
-    """Every one. Five bits of the last check byte and one of each other say nothing: these commands are taken."""
+    """Each bit of a command is flipped. Five bits of the last check byte and one of each other byte mean nothing: these
+    commands are taken."""
     whole = sealed(order(0x12345 | 1, 1, 0x54321, True))
     bits = 8 * (len(whole) - 1)
     word = int.from_bytes(whole, "little")
@@ -197,7 +200,7 @@ def test_no_other_kind_is_taken(obey):
 @pytest.mark.whole
 @pytest.mark.parametrize("sheet", [5, 10])
 def test_a_sheet_of_several_takes_what_has_its_number_in_every_bit(bench, sheet):
-    """Each bit of the two bytes that tell the sheet is wrong once, with a check that is right."""
+    """Packets are ignored if one bit of the two bytes that tell the sheet is wrong, with a check that is right."""
     dut = RequestReader(commands=True, sheet=sheet)
     packets = []
     for wrong in [1 << bit for bit in range(16)] + [0]:
@@ -208,7 +211,8 @@ def test_a_sheet_of_several_takes_what_has_its_number_in_every_bit(bench, sheet)
 
 
 def test_any_bytes_hold_what_the_model_finds(bench, rng):
-    """Requests, commands, parts of some, anything: in each clock, the number too."""
+    """In random bytes, requests, commands and parts of some, the reader finds those of the golden model, in the same
+    clock, with the same number."""
     bit_clocks = 4
     dut = Listener(Receiver(bit_clocks), commands=True)
     data = b"\0"
@@ -222,8 +226,8 @@ def test_any_bytes_hold_what_the_model_finds(bench, rng):
     cycles = dut.receive(sim, line(data, bit_clocks))
     seen = {name: sim.watch(getattr(dut.reader, name)) for name in OUTPUTS}
     sim.run(cycles)
-    told = heard([(IDLE, data)], bit_clocks, commands=True)
-    assert taken(seen) == [(one.cycle, one.number, one.hello, one.command) for one in told.requests]
-    assert seen["number"].values == [told.number(cycle) for cycle in range(cycles)]
-    assert sum(one.command is not None for one in told.requests) > 4
-    assert sum(one.command is None for one in told.requests) > 2
+    expected = heard([(IDLE, data)], bit_clocks, commands=True)
+    assert taken(seen) == [(one.cycle, one.number, one.hello, one.command) for one in expected.requests]
+    assert seen["number"].values == [expected.number(cycle) for cycle in range(cycles)]
+    assert sum(one.command is not None for one in expected.requests) > 4
+    assert sum(one.command is None for one in expected.requests) > 2

@@ -44,7 +44,7 @@ class Hit(core.StreamTop):
 
 
 class Copy(Top):
-    """One of two copies, which sends a wrong bit."""
+    """A copy of the gateware that sends a wrong bit."""
 
     def __init__(self, skin: Skin):
         super().__init__(skin, copy=True)

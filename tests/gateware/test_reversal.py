@@ -36,8 +36,8 @@ def pins(monkeypatch) -> list[dict[str, int]]:
 
 
 def check_pins(skin: Skin, pins: list[dict[str, int]]) -> None:
-    """Nothing is driven at power-up; a selected row is alone, all others are held; and while columns are driven, in the
-    clock before and in the one after, no row is selected. Rows that are let go are let go together."""
+    """Check the pins: none is driven at power-up; a selected row is alone while others are held; no row is selected
+    while columns are driven, a clock before and a clock after. Rows are released together."""
     everything = (1 << skin.rows) - 1
     assert pins[0]["columns_drive"] == 0
     assert selected(skin, pins[0]) == 0
@@ -70,8 +70,8 @@ def moments(skin: Skin, record: int) -> tuple[int, int, int]:
 
 
 def check_truth(skin: Skin, timeline: Timeline, trace: Trace, changes: list[tuple[int, int]]) -> int:
-    """Each frame holds what read pressed in its slots, all that was closed from its first sample to its last, and no
-    more. Returns the number of frames with a slot."""
+    """Check that each frame holds the cells that read pressed in its slots, all that were closed from its first sample
+    to its last, and no others. Returns the number of frames with a slot."""
     found = reported(skin, trace)
     parted = frames(slots(changes, trace.cycles), [end for end, _ in found])
     begins = [frame[0].begin for frame in parted]
@@ -99,7 +99,7 @@ def check_truth(skin: Skin, timeline: Timeline, trace: Trace, changes: list[tupl
 
 
 def check_life(skin: Skin, rng: random.Random, cycles: int, pins: list[dict[str, int]]) -> int:
-    """One board's life: lockstep, its pins, the rows it drives, and its frames. Returns the number of events."""
+    """Check a board's run: lockstep, its pins, the rows it drives, and its frames. Returns the number of events."""
     pins.clear()
     timeline = touches(skin, rng, cycles)
     trace = bench_amaranth.run(skin, timeline, cycles)
@@ -128,14 +128,15 @@ SAMPLE = [
     "fields", SAMPLE, ids=lambda fields: f"{fields['rows']}x{fields['columns']}-{fields.get('labeller', 'run')}"
 )
 def test_gateware_does_what_the_golden_model_says_and_frames_are_true(rng, pins, fields):
-    """The serial labeller takes up to 130 clocks for a row of 64 columns, which the scan waits for."""
+    """Random Skins of all labellers; the serial one takes up to 130 clocks for a row of 64 columns, and the scan waits
+    for it."""
     assert check_life(small(**fields), rng, 1600, pins) > 150
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("number", range(len(COVERING)))
 def test_covering_set_in_amaranths_simulator(pins, number):
-    """Every pair of choices; what comes and goes here is slower than above, and stuck columns are more."""
+    """Skins with every pair of choices; cells change more slowly than in other tests, and more columns are stuck."""
     skin, cycles = skin_for(COVERING[number]), 5000
     timeline = stimulus(skin, cycles, number)
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 300

@@ -65,8 +65,8 @@ def wanted_slots(touch: int, cells: np.ndarray) -> list[tuple[int, int, int]]:
 
 
 def test_every_3x3_frame_held_still_is_reported_exactly_in_a_slot_per_row(sheet, rng, record_property):
-    """Each at some place of the sheet, after a rest of any length. The touch is seen after two clocks, the rows are
-    sampled a projection time later, and driven one after the other in ascending order from the sixth clock after
+    """Each 3x3 frame at some place of the sheet, after a rest of any length. The touch is seen after two clocks, rows
+    are sampled a projection time later, and driven one after the other in ascending order from the sixth clock after
     that. The next frame, of the same cells, is not sent."""
     for pattern in range(1, 512):
         cells = draw(pattern, rng.randrange(FAST.rows - 2), rng.randrange(1, FAST.columns - 2))

@@ -1,4 +1,4 @@
-"""Line reversal with guard lines: each break is told and nothing else, and when touches are seen."""
+"""Line reversal with guard lines: each break is reported and nothing else, and when touches are seen."""
 
 from dataclasses import dataclass
 
@@ -26,10 +26,10 @@ SLOW = {"clock_hz": 1_000_000, "baud": 100_000, "precharge_us": 1.0, "settle_us"
 
 @dataclass
 class Life:
-    """What a scanner with guard lines did, cycle by cycle."""
+    """Pins, reports and rows of a scanner with guard lines, cycle by cycle."""
 
     words: list[int]
-    """What is told: rows lowest, then columns, then stuck columns."""
+    """What is reported: rows lowest, then columns, then stuck columns."""
     contact: list[int]
     packed: list[int]
     """Cycles in which a frame was packed."""
@@ -130,7 +130,7 @@ def in_turn(rng, spacing: int, lasts: int) -> tuple[list[int], list[tuple[int, C
 
 
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
-def test_at_rest_each_break_at_each_place_is_told_after_two_checks_and_nothing_else(bench, soon, rng, diodes):
+def test_at_rest_each_break_at_each_place_is_reported_after_two_checks_and_nothing_else(bench, soon, rng, diodes):
     skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
     spacing = 540
     at, cuts = in_turn(rng, spacing, 100)
@@ -147,7 +147,7 @@ def test_two_checks_at_rest_come_within_one_ms():
 
 
 @pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["col2row"]))
-def test_each_break_at_each_place_is_told_within_two_frames_whatever_is_pressed(bench, monkeypatch, rng, diodes):
+def test_each_break_at_each_place_is_reported_within_two_frames_whatever_is_pressed(bench, monkeypatch, rng, diodes):
     monkeypatch.setattr(reversal, "RETRY_BIT", 7)
     skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
     spacing = 560
@@ -166,7 +166,7 @@ def test_each_break_at_each_place_is_told_within_two_frames_whatever_is_pressed(
         assert life.words[start + spacing - 80] == 0, f"{cut} was mended"
 
 
-def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, soon, rng):
+def test_a_whole_sheet_is_never_reported_whatever_is_pressed(bench, soon, rng):
     skin = small(rows=2, columns=3, project_us=2.0, mask=((0, 1),), **SLOW)
     every = [np.array([number >> bit & 1 for bit in range(6)], bool).reshape(2, 3) for number in range(64)]
     pieces = [(60 * number, cells, None) for number, cells in enumerate(every)]
@@ -176,8 +176,8 @@ def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, soon, rng):
 
 @pytest.mark.parametrize(("project_us", "clocks"), [(1.0, 43), (0.7, 36)])
 def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project_us, clocks):
-    """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7
-    clocks after the touch, in place of 3 clocks."""
+    """A check of an untouched sheet delays a touch: at worst ``contact`` comes after settle and projection time and 7
+    clocks, not 3 clocks."""
     monkeypatch.setattr(reversal, "CHECK_BIT", 4)
     monkeypatch.setattr(reversal_guard, "CHECK_BIT", 4)
     skin = small(rows=2, columns=2, settle_us=0.5, project_us=project_us, precharge_us=0.25, guard=True)

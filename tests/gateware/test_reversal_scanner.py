@@ -16,8 +16,8 @@ from contactfpga_sim.model.golden import guard
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """What is done to the sheet: bit c of ``cells[r]`` is a closed switch; ``lifted`` rows read touched though nothing
-    feeds them; ``stuck`` columns read pressed."""
+    """State of the simulated sheet: bit c of ``cells[r]`` is a closed switch; ``lifted`` rows read touched though
+    nothing feeds them; ``stuck`` columns read pressed."""
 
     cells: list[int]
     stuck: int = 0
@@ -57,7 +57,7 @@ class Sheet:
 
 @dataclasses.dataclass
 class Life:
-    """What a scanner did."""
+    """Levels and rows of a scanner, cycle by cycle."""
 
     sheet: Sheet
     slots: list[Slot]
@@ -131,8 +131,8 @@ def check_rows(skin: Skin, life: Life, at) -> int:
         if skin.report != "cells" and not before[3]:
             assert row[1] > before[1], "rows ascend"
             assert row[1] == before[1] + 1 or not before[2], "an empty row parts those that are no neighbors"
-    told = [slot for slot, cells in read.items() if cells]
-    for slot, row in zip(told, given):
+    reported = [slot for slot, cells in read.items() if cells]
+    for slot, row in zip(reported, given):
         following = next((other.begin for other in life.slots if other.begin > slot.begin), None)
         assert following is None or following >= row[2] + 4
     for frame in frames(life.slots, life.ends):
@@ -150,8 +150,8 @@ def check_rows(skin: Skin, life: Life, at) -> int:
 
 def check_motion(skin: Skin, life: Life, at) -> set[bool]:
     """A frame tells of motion where a row that it drove had no pressed cell, but not of rows with a masked switch; an
-    untouched sheet does not. Returns what frames told."""
-    told = {False}
+    untouched sheet does not. Returns what frames reported."""
+    reported = {False}
     driven = frames(life.slots, life.ends)
     ends = [end for end in life.ends if end < len(life.motion)]
     begun = [next((end for end in ends if end > frame[-1].sample), None) for frame in driven]
@@ -161,9 +161,9 @@ def check_motion(skin: Skin, life: Life, at) -> set[bool]:
         clean = [slot for slot in frame if present(skin, slot.row) == (1 << skin.columns) - 1]
         moved = any(not at(slot.sample).cells[slot.row] for slot in clean)
         assert life.motion[end] == moved, frame
-        told.add(moved)
+        reported.add(moved)
     assert not any(life.motion[end] for end in ends if end not in begun)
-    return told
+    return reported
 
 
 def check_pins(life: Life) -> None:
@@ -196,7 +196,8 @@ def test_a_scan_waits_for_rows_and_frames_with_its_lines_safe_and_loses_nothing(
 
 @pytest.mark.parametrize("fields", STALLS, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
 def test_rows_that_read_touched_for_no_reason_cost_slots_and_change_nothing_else(rng, fields):
-    """By coupling, for instance. What is read comes from slots, and an untouched row in one has no cell."""
+    """A row that reads touched without a touch, by coupling for instance, gets a slot, and its cells come from that
+    slot."""
     skin = small(**fields)
     at = changing(rng, skin, CYCLES + 1, lifts=True)
     life = live(skin, at, CYCLES)
@@ -262,8 +263,9 @@ def fought(life: Life, column: int, stuck: range) -> list[int]:
 
 
 @pytest.mark.parametrize("touched", [True, False], ids=["touched", "at rest"])
-def test_a_stuck_column_is_told_and_not_driven_until_it_is_tried(soon, touched):
-    """Two windows find it, of which the first began before. Then it is tried, for a window each, and told meanwhile."""
+def test_a_stuck_column_is_reported_and_not_driven_until_it_is_tried(soon, touched):
+    """Two windows find it, of which the first began before. Then it is tried, for a window each, and
+    reported meanwhile."""
     skin = small(rows=2, columns=3, mask=((0, 0), (1, 0)), release_us=1.0, **SLOW)
     stuck = range(140, 3 * soon - 20)
     life = live(skin, lambda cycle: State([0, 0b100 * touched], 0b010 * (cycle in stuck)), 4 * soon)
@@ -285,7 +287,8 @@ def test_a_stuck_column_is_told_and_not_driven_until_it_is_tried(soon, touched):
 
 @pytest.mark.parametrize("clocks", range(1, 9))
 def test_a_column_that_reads_pressed_for_up_to_eight_clocks_is_driven_on(rng, clocks):
-    """At rest and in frames, from any clock on."""
+    """A column is still driven after it read pressed for at most eight clocks, at rest and in frames, from any clock
+    on."""
     skin = small(rows=2, columns=2, release_us=1.0, **SLOW)
     starts = list(itertools.accumulate(rng.randrange(80, 130) for _ in range(20)))
     wrong = {start + more: 1 << rng.randrange(2) for start in starts for more in range(clocks)}
@@ -295,7 +298,8 @@ def test_a_column_that_reads_pressed_for_up_to_eight_clocks_is_driven_on(rng, cl
 
 
 def test_a_touch_of_a_column_that_was_let_go_is_seen_when_it_is_tried(soon):
-    """The pressed switch pulls it to its row's level meanwhile, as if it were still stuck."""
+    """A touch keeps a released column at its row's level, as if it were still stuck, and is seen when the column is
+    driven again."""
     skin = small(rows=2, columns=2, release_us=1.0, **SLOW)
     life = live(skin, lambda cycle: State([0b01 * (cycle >= 300), 0], 0b01 * (20 <= cycle < 200)), 2 * soon)
     assert not life.sheet.columns[300] & 1

@@ -157,7 +157,7 @@ def test_ours_are_as_large_as_the_page_on_performance_says():
                 assert row[f"{device.title}, {rivals.BUILDS}"] == theirs
 
 
-def test_plain_tells_nothing_and_told_only_what_is_true():
+def test_plain_tells_yosys_nothing_and_our_builds_only_what_is_true():
     for device in DEVICES:
         assert rivals.before(device, rivals.PLAIN, collides=False) == ()
         ours, theirs = (rivals.before(device, rivals.BUILDS, collides) for collides in (False, True))

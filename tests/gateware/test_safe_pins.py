@@ -46,7 +46,8 @@ def events(skin: Skin, cycles: int, pause: int) -> Timeline:
 
 @pytest.mark.slow
 def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
-    """Its lines are soldered in another order."""
+    """A compiled board with guard lines, soldered in another order: ``contact`` and ``alive`` as the golden model
+    predicts."""
     cycles = 400_000
     timeline = events(GUARDED, cycles, 80_000)
     expected = predict(GUARDED, timeline, cycles)
@@ -58,7 +59,8 @@ def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
 @pytest.mark.whole
 @pytest.mark.parametrize("name", sample(SKINS, quick=["guarded", "reversal"]))
 def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
-    """What is told of lines is renewed every 512 us."""
+    """``contact`` and ``alive`` as the golden model predicts, in Amaranth's simulator. Reports of faulty lines are
+    renewed every 512 us."""
     for scan in (raster, reversal):
         monkeypatch.setattr(scan, "RETRY_BIT", 9)
     monkeypatch.setattr(guard, "RETRY_US", 2**9)
@@ -72,7 +74,8 @@ def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
 
 
 def test_alive_turns_where_all_was_well_since_the_last_tick(bench, rng):
-    """Also where all is well in the clock of a tick, before it or after it, or while a fault is told."""
+    """``alive`` toggles at a tick if all was well since the last one, also if it was well in the clock of a tick,
+    before or after it, or while a fault is reported."""
     cycles, period = 6_000, 7
     well = [int(rng.random() < 0.15) for _ in range(cycles)]
     fault = [int(rng.random() < 0.1) for _ in range(cycles)]

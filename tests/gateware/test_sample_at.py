@@ -46,8 +46,8 @@ QUICK = ["reversal, guarded"]
 
 
 def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
-    """Cells, stuck columns and cuts that change at any clock, more often than rows are driven; commands of any value,
-    other commands and requests at any time."""
+    """Random histories of a sheet: cells, stuck columns and cuts change at any clock, more often than rows are driven;
+    commands of any value, other commands and requests come at any time."""
     rng, known = np.random.default_rng(seed), facts(skin)
     cycles = frames * known.scan_clocks
     starts = np.cumsum(rng.integers(1, 2 * known.row_clocks, size=cycles // known.row_clocks))
@@ -90,7 +90,7 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
 
 
 class Alone(wiring.Component):
-    """What obeys the command, without a scan."""
+    """The gateware that obeys the command "sample at", without a scan."""
 
     def __init__(self, skin: Skin):
         self.derived = skin.derived

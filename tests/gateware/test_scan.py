@@ -26,14 +26,14 @@ DIODES = ("col2row", "row2col")
 
 
 def skin_of(name, **options):
-    """A clock of 1 MHz, so that a microsecond is a clock, unless the sheet has another one."""
+    """A Skin with a clock of 1 MHz, so that a microsecond is a clock, unless another one is given."""
     fields = {"report": "cells", "clock_hz": 1_000_000, "baud": 250_000} | SKINS[name] | options
     return Skin(**fields)
 
 
 @dataclasses.dataclass
 class Expected:
-    """What the rules say of a run."""
+    """Pin levels and rows of a run by the rules of docs/timing.md."""
 
     driven: list  # number of the driven row in each cycle, or None
     rows: list  # (cycle, cells) of each transfer
@@ -174,7 +174,7 @@ def test_a_row_is_offered_until_it_is_taken(bench, rng):
 
 
 class Epochs(wiring.Component):
-    """What counts them, without a scan."""
+    """The gateware's counter of epochs, without a scan."""
 
     def __init__(self, late):
         self.late = late
@@ -188,7 +188,8 @@ class Epochs(wiring.Component):
 
 @pytest.mark.parametrize("late", [False, True])
 def test_an_epoch_begins_with_each_further_2_to_the_22_us_and_not_at_power_up(bench, rng, late):
-    """Where columns are shifted in for longer than rows are, the time begins below 0."""
+    """Epochs begin at multiples of 2^22 us, also of a time that begins below 0 because columns shift in for longer than
+    rows."""
     times = [-5 if late else 0]
     while len(times) < 400:
         times.append(times[-1] + rng.choice([1, 3, rng.randrange(1 << 20)]))

@@ -120,7 +120,7 @@ def crossing(row: int, column: int) -> str:
 
 
 def single_faults(rows: int, columns: int):
-    """(shorts, switches that have to be pressed, what is told) of each pair of lines and each diode."""
+    """(shorts, switches that have to be pressed, what is reported) of each pair of lines and each diode."""
     for one, other in itertools.combinations(range(rows), 2):
         yield Shorts(rows=((one, other),)), (), f"rows {one} and {other} joined"
     for one, other in itertools.combinations(range(columns), 2):
@@ -140,12 +140,12 @@ def any_cells(rng, rows: int, columns: int) -> np.ndarray:
 @pytest.mark.parametrize("diodes", ["col2row", "row2col"])
 def test_each_single_short_and_bridged_diode_is_named_whatever_is_pressed(bench, rng, diodes):
     skin = small(rows=3, columns=2, self_test=True, diodes=diodes)
-    for shorts, needed, told in single_faults(3, 2):
+    for shorts, needed, reported in single_faults(3, 2):
         cells = any_cells(rng, 3, 2)
         for place in needed:
             cells[place] = True
         test, bit = self_test(bench, skin, cells, shorts)
-        assert (test.faults, test.untested, bit) == ((told,), (), 1), cells
+        assert (test.faults, test.untested, bit) == ((reported,), (), 1), cells
 
 
 def test_a_whole_sheet_says_nothing_but_what_is_pressed(bench, rng):
@@ -185,7 +185,7 @@ def test_the_first_frame_comes_after_the_self_test_in_the_stated_time():
     assert trace.rows[0][0] - without.rows[0][0] == later
 
 
-def test_what_is_told_follows_from_each_slot_of_one_test_after_the_other(bench, rng):
+def test_what_is_reported_follows_from_each_slot_of_one_test_after_the_other(bench, rng):
     """Lines that rise come and go in any clock, in most tests none. A column that rises in the first slot says nothing
     in that test; a row that does with no column is joined with the supply. A whole test without a finding ends it."""
     skin, cycles = small(rows=3, columns=2, self_test=True, mask=((0, 1), (1, 1), (2, 1))), 30_000
@@ -207,9 +207,9 @@ def test_what_is_told_follows_from_each_slot_of_one_test_after_the_other(bench, 
     ends, number, joined = sim.watch(dut.ends), sim.watch(dut.slots.payload.number), sim.watch(dut.joined)
     sim.run(cycles - 1)
 
-    told, expected, first, found, tests = 0, [], 0, False, []
+    reported, expected, first, found, tests = 0, [], 0, False, []
     for cycle in range(cycles - 1):
-        expected.append(told)
+        expected.append(reported)
         if not ends[cycle]:
             continue
         line = number[cycle] - 1
@@ -220,9 +220,9 @@ def test_what_is_told_follows_from_each_slot_of_one_test_after_the_other(bench, 
         else:
             bad = bool(counts & ~first & ~(1 << line) & (0b11111 if line < 3 else 0b11000))
         found |= bad
-        told |= bad
+        reported |= bad
         if line == count - 1:
-            told = int(found)
+            reported = int(found)
             tests.append((bool(first), found))
     assert joined.values == expected
     assert {(False, False), (False, True), (True, False), (True, True)} <= {*tests}

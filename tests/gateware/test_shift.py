@@ -38,7 +38,7 @@ def skin_of(rows=3, columns=4, megahertz=12, **options):
 
 @dataclasses.dataclass
 class Times:
-    """E, X, Z, S, L and T by the rules."""
+    """The times E, X, Z, S, L and T of docs/timing.md, by its rules."""
 
     bit: int
     late: int
@@ -62,7 +62,7 @@ def times(skin):
 
 @dataclasses.dataclass
 class Run:
-    """What the scanner did, by cycle."""
+    """Levels and rows of the scanner, by cycle."""
 
     driven: list  # rows that are selected
     rows: list  # (cycle, cells) of each transfer

@@ -86,7 +86,8 @@ REPORTS, DEBOUNCES = ("moments", "barycenter", "cells"), ("none", "sym_defer_pk"
     ),
 )
 def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, debounce, rows, columns):
-    """After a debounce the next frame's rows are sampled before this frame's trailer is packed."""
+    """The trailer has its own frame's time, though with debounce the next frame's rows are sampled before it is
+    packed."""
     skin, clocks = shortest(
         rows=rows,
         columns=columns,

@@ -10,9 +10,9 @@ SAMPLED = (4, 5, 104)
 """With fewer clocks a board reads pulses."""
 
 
-def told(bench, bit_clocks, levels, idle=3):
-    """What the receiver tells of levels that start in cycle ``idle``: (cycle, level) of each data bit, cycles of good
-    stop bits, and of bad ones."""
+def reported(bench, bit_clocks, levels, idle=3):
+    """Run the receiver on levels that start in cycle ``idle``; returns (cycle, level) of each data bit, and the cycles
+    of good and of bad stop bits."""
     dut = Receiver(bit_clocks)
     sim = bench(dut)
     levels = [1] * idle + levels + [1] * 12 * bit_clocks
@@ -25,7 +25,7 @@ def told(bench, bit_clocks, levels, idle=3):
 
 def received(bench, bit_clocks, levels, idle=3):
     """Cycles of good stop bits."""
-    return told(bench, bit_clocks, levels, idle)[1]
+    return reported(bench, bit_clocks, levels, idle)[1]
 
 
 def moment(bit_clocks, start):
@@ -60,9 +60,9 @@ def test_a_byte_starts_one_clock_after_its_transfer_and_the_line_rests_high(benc
 
 
 @pytest.mark.parametrize("bit_clocks", SAMPLED)
-def test_every_bit_is_told_in_its_middle(bench, rng, bit_clocks):
+def test_every_bit_is_reported_in_its_middle(bench, rng, bit_clocks):
     data = [0x00, 0xFF, 0x55, *(rng.randrange(256) for _ in range(5))]
-    bits, good, bad = told(bench, bit_clocks, line(data, bit_clocks), idle=5)
+    bits, good, bad = reported(bench, bit_clocks, line(data, bit_clocks), idle=5)
     first = 5 + 2 + bit_clocks // 2
     assert bits == [
         (first + (10 * index + 1 + place) * bit_clocks, byte >> place & 1)
@@ -85,7 +85,7 @@ def test_a_low_pulse_counts_as_a_start_bit_from_half_a_bit_on(bench, bit_clocks)
 def test_a_byte_with_a_low_stop_bit_is_no_byte(bench, bit_clocks):
     levels = line([0x33], bit_clocks)
     center = 9 * bit_clocks + bit_clocks // 2
-    bits, good, bad = told(bench, bit_clocks, levels[:-bit_clocks] + [0] * (bit_clocks // 2 + 1))
+    bits, good, bad = reported(bench, bit_clocks, levels[:-bit_clocks] + [0] * (bit_clocks // 2 + 1))
     assert (good, bad) == ([], [moment(bit_clocks, 3)])
     assert [level for _, level in bits] == [1, 1, 0, 0, 1, 1, 0, 0]
     spike = list(levels)

@@ -51,7 +51,7 @@ ZERO, THRESHOLD, SUM_THRESHOLD = 3, 4, 5
 
 
 def readings(rng, skin, cycles, bits=12):
-    """What the units would read, at random changes."""
+    """Random readings of the units, with the cycles of their changes."""
     changes, start = [], 0
     while start < cycles:
         changes.append((start, [rng.choice([0, 2**bits - 1, rng.randrange(2**bits)]) for _ in range(skin.units)]))
@@ -88,8 +88,8 @@ class Inputs:
 @pytest.mark.whole
 @pytest.mark.parametrize("name", sample(SKINS, quick=["fail safe", "guard"]))
 def test_board_does_what_the_golden_model_says(name, monkeypatch):
-    """With guard lines for longer than the first hello. What is told of them is renewed every 256 us, so that reports
-    and readings wait together."""
+    """Boards with units do what the golden model says; with guard lines for longer than the first hello. Faults are
+    renewed every 256 us, so that reports and readings wait together."""
     monkeypatch.setattr(raster, "RETRY_BIT", 8)
     monkeypatch.setattr(guard, "RETRY_US", 2**8)
     skin = SKINS[name]
@@ -141,7 +141,7 @@ def changes(levels):
 
 
 def sweep_of(readings, data):
-    """What plain bytes of a packet say: readings and sequence, by docs/protocol.md."""
+    """Readings and sequence in the plain bytes of a packet, by docs/protocol.md."""
     digits = [byte - 128 for byte in data]
     found = [digits[place] + 128 * digits[place + 1] for place in range(0, 2 * readings, 2)]
     trailer = sum(digit << 7 * place for place, digit in enumerate(digits[2 * readings :]))
@@ -149,8 +149,8 @@ def sweep_of(readings, data):
 
 
 def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rng):
-    """Each sweep reads numbers that say which one it is. Some are complete in the clock in which the one before is
-    taken."""
+    """A packet holds one whole sweep, the newest: each reading names its sweep. Some sweeps complete in the clock in
+    which the one before is taken."""
     skin, cycles = SKINS["sums"], 9_000
     sweep = skin.derived.units.sweep_clocks
     timeline = Timeline([], units=[(3 + n * sweep, [3 * n, 3 * n + 1, 3 * n + 2]) for n in range(cycles // sweep)])
@@ -216,7 +216,7 @@ def test_pins_keep_the_times_of_the_data_sheet(bench, clock_hz, supply_v):
 
 @pytest.mark.parametrize("delay_ns", [0, 200])
 def test_a_converter_that_answers_late_is_read(bench, delay_ns):
-    """It may take 200 ns after the falling edge: 2 of 3 clocks of a level at 12 MHz."""
+    """A bit may come 200 ns after the falling edge, 2 of the 3 clocks of a level at 12 MHz."""
     skin = ALONE["12 MHz at 5 V"]
     dut = Mcp3208(skin)
     sim = bench(dut)
@@ -232,7 +232,8 @@ def test_a_converter_that_answers_late_is_read(bench, delay_ns):
 
 
 def test_contact_rises_within_a_sweep_and_eight_clocks():
-    """Of a sweep in which all units see it; of a touch at any other moment, within a conversion more."""
+    """``contact`` rises within a sweep and eight clocks of a touch that all units of a sweep see, otherwise within a
+    conversion more."""
     skin = SKINS["sums"].replace(fail_safe=True)
     derived = skin.derived.units
     begun, sweep = 2 * derived.level_clocks + 1, derived.sweep_clocks

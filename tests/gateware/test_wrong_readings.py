@@ -46,7 +46,7 @@ def rises(pieces: list, cycles: int) -> list[int]:
 
 
 def spaced(trials, period: int) -> tuple[list, list[int]]:
-    """What is done to the sheet, and when each touch begins, in trials that begin every so many clocks."""
+    """Trials that begin every so many clocks: the changes of the sheet, and the clock in which each touch begins."""
     pieces, touches = [], []
     for number, trial in enumerate(trials, 1):
         for after, cells, stuck in trial:
@@ -58,7 +58,8 @@ def spaced(trials, period: int) -> tuple[list, list[int]]:
 
 @pytest.mark.parametrize("length", sample(range(1, LONGEST + 1), quick=[1, 8], slow=range(2, 8)))
 def test_at_rest_a_wrong_reading_delays_contact_by_no_more_than_it_lasts(length):
-    """In each column, and at each time around the touch of it; a touch 10 us later is seen as ever."""
+    """A wrong reading of any column, at any time around a touch of it, delays ``contact`` by at most its length; a
+    touch 10 us later is not delayed."""
     trials = []
     for column, after in itertools.product(range(FAST.columns), [*range(-length, PROJECT + 2, 3), 240]):
         touched = cell(column // 3, column)
@@ -96,8 +97,8 @@ def test_a_wrong_reading_at_any_time_of_a_frame_leaves_the_next_touch_as_it_was(
 
 
 @pytest.mark.slow  # a board of its own; the compiled board over three tries is the golden model's below
-def test_a_column_that_stays_low_costs_its_own_cells_is_told_and_is_tried_every_66_ms():
-    """For 300 ms, while others are touched. It works again after the first try that finds it well."""
+def test_a_column_that_stays_low_costs_its_own_cells_is_reported_and_is_tried_every_66_ms():
+    """A column is low for 300 ms while others are touched. Its cells return after the first try that finds it whole."""
     ms, rng = FAST.clock_hz // 1000, np.random.default_rng(7)
     short, end = columns(5), 370
     touched = {at: (int(rng.integers(16)), int(rng.choice([0, 1, 3, 7, 9, 15]))) for at in range(10, 300, 2)}
@@ -125,8 +126,8 @@ def test_a_column_that_stays_low_costs_its_own_cells_is_told_and_is_tried_every_
 
 
 def test_at_rest_a_column_that_goes_low_is_known_at_once(soon, pins):
-    """Without guard lines: as soon as it is let go, ``contact`` is high, and a frame says why, with nothing touched.
-    Another column is touched meanwhile. Once the column is found whole, all is as before."""
+    """Without guard lines, ``contact`` is high and a frame reports the column as soon as it is released, though nothing
+    is touched. Another column is touched meanwhile. Once the column is whole, all is as before."""
     skin, low = small(fail_safe=True, alive=True), np.arange(4) == 2
     nothing, touched = np.zeros((3, 4), bool), np.zeros((3, 4), bool)
     touched[1, 0] = True
@@ -174,7 +175,7 @@ def any_history(rng: random.Random, skin: Skin, cycles: int) -> Timeline:
 
 @pytest.fixture
 def soon(monkeypatch):
-    """Columns are tried every 64 us, a sheet at rest is checked every 16 us, and ``alive`` turns every 20 us."""
+    """Columns are tried every 64 us, a sheet at rest is checked every 16 us, and ``alive`` toggles every 20 us."""
     checked_soon(monkeypatch, check_bit=4, retry_bit=6)
     for module in (alive, sys.modules[predict.__module__]):
         monkeypatch.setattr(module, "TICK_US", 20)

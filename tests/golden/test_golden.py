@@ -121,10 +121,10 @@ def test_frames_from_the_next_sample_on_tell_a_request_and_a_hello_repeats_its_n
     skin = Skin()
     start, number = 10 * SCAN, 0x12345
     trace = predict(skin, Timeline([], [(start, golden.request(number, wants_hello))]), 26 * SCAN)
-    told = {frame.time_us: frame.heard for frame in sent_frames(skin, trace)}
+    numbers = {frame.time_us: frame.heard for frame in sent_frames(skin, trace)}
     came = start + 9 * 40 + 2 + 2 + 36
-    assert told == {time_us: number % 8 * (12 * time_us > came) for time_us in told}
-    assert set(told.values()) == {0, number % 8}
+    assert numbers == {time_us: number % 8 * (12 * time_us > came) for time_us in numbers}
+    assert set(numbers.values()) == {0, number % 8}
     hellos = [(cycle, plain) for cycle, plain in packets(skin, trace) if plain[-1] >> 4 == protocol.KIND_HELLO]
     assert len(hellos) == 1 + wants_hello
     for cycle, plain in hellos:

@@ -12,7 +12,7 @@ pytest.importorskip("viser")
 import contactfpga
 from contactfpga.tools.view import chart, obstacle, opening
 from contactfpga.tools.view.fingers import Finger
-from contactfpga.tools.view.simulated import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
+from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
 from contactfpga_sim.lab.mujoco.clip import Asked
 from contactfpga_sim.lab.view import browser
 
@@ -60,7 +60,7 @@ def test_it_goes_on_untouched_and_stops_where_a_finger_pushes():
     speed, state, copy = pushed("Stop", 5.0)
     assert abs(speed) < 0.05
     assert len(state.zones) == 1
-    assert copy.told("arm") == "pressed by 5.0 N, most so far 5.0 N"
+    assert copy.pressed_by("arm") == "pressed by 5.0 N, most so far 5.0 N"
 
 
 def test_without_a_reflex_it_pushes_on_and_the_push_is_physical():

@@ -1,4 +1,4 @@
-"""Boards over Zenoh, in processes of their own: what fails is told or counted, and nothing wrong is delivered."""
+"""Boards over Zenoh, in processes of their own: what fails is reported or counted, and nothing wrong is delivered."""
 
 import collections
 import itertools
@@ -151,7 +151,7 @@ def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
             assert board.stats.restarts == 0
 
 
-def test_boards_that_go_together_are_told_together(capsys, monkeypatch):
+def test_boards_that_go_together_are_reported_together(capsys, monkeypatch):
     """As the sheets of one FPGA do, which share what became of their port."""
     monkeypatch.setattr(command, "SHOWN_S", 0.5)
     of_both, of_one = contactfpga.PortLost("A is gone"), contactfpga.PortLost("B is gone")
@@ -177,15 +177,15 @@ def test_boards_that_go_together_are_told_together(capsys, monkeypatch):
     assert publish_all(of_both, of_both) == "contactfpga: A is gone\n"
     said = publish_all(of_both, of_both, of_one).splitlines()
     assert sorted(said) == ["contactfpga: A is gone", "contactfpga: B is gone"]
-    told, tell = threading.Event(), interrupt.failed
-    monkeypatch.setattr(interrupt, "failed", lambda reason: (tell(reason), told.set()))
-    with interrupt._listening(), background(lambda: told.wait(LONG) and signal.raise_signal(signal.SIGINT)):
+    failed, tell = threading.Event(), interrupt.failed
+    monkeypatch.setattr(interrupt, "failed", lambda reason: (tell(reason), failed.set()))
+    with interrupt._listening(), background(lambda: failed.wait(LONG) and signal.raise_signal(signal.SIGINT)):
         said = publish_all(of_both, None)
     assert said == "contactfpga: A is gone; the others go on\n"
     assert len(closed) == 7
 
 
-def test_a_port_that_is_named_twice_is_told_as_that(streaming, tmp_path, capsys):
+def test_a_port_that_is_named_twice_is_reported_as_that(streaming, tmp_path, capsys):
     (link := tmp_path / "left").symlink_to(streaming.path)
     for again in (streaming.path, link):
         assert cli.main(["publish", streaming.path, str(again), "--timeout", "60"]) == 1

@@ -46,7 +46,7 @@ def test_without_its_tools_the_scenes_through_cocotb_are_left_out_and_that_is_sa
     assert "left out: it needs Verilator, perl, make and c++" in capsys.readouterr().out
 
 
-def test_a_difference_is_told(monkeypatch, capsys, tmp_path):
+def test_a_difference_is_reported(monkeypatch, capsys, tmp_path):
     def wrong(skin, timeline, cycles):
         pieces = [(cycle, np.roll(cells, 1, axis=1), stuck) for cycle, cells, stuck in timeline.pieces]
         return right(skin, type(timeline)(pieces), cycles)
@@ -56,6 +56,6 @@ def test_a_difference_is_told(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(demo, "RUNS", {"fingertip": ("compiled",)})
     monkeypatch.setattr(sys, "argv", ["demo", "--picture", str(tmp_path / "scenes.png")])
     assert demo.main() == 1
-    told = " ".join(capsys.readouterr().out.split())
-    assert "1 of 1 runs differ" in told
-    assert "expected row" in told
+    reported = " ".join(capsys.readouterr().out.split())
+    assert "1 of 1 runs differ" in reported
+    assert "expected row" in reported

@@ -35,7 +35,7 @@ def test_a_default_skin_s_gateware_is_read_in_an_afternoon():
 def test_a_part_is_loaded_for_the_skins_that_have_it():
     assert loaded("guard=True, fail_safe=True, alive=True").keys() - loaded().keys() == {
         "scan.guard",
-        "link.between",
+        "link.other_packets",
         "link.faults",
         "link.alive",
     }

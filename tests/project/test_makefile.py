@@ -36,14 +36,14 @@ NAMES = ["a$(touch owned)b", "a`touch owned`b", 'a"b', "a\tb", "a\nb", "a#b", "a
 
 
 @pytest.mark.parametrize(("name", "goal"), [*((name, "test") for name in NAMES), ("a:b", "check"), ("a:b", "lint")])
-def test_a_folder_that_make_cannot_build_in_is_told(tmp_path, name, goal):
+def test_a_folder_that_make_cannot_build_in_is_reported(tmp_path, name, goal):
     done = make(clone(tmp_path / name), goal)
     assert done.returncode == 2
     assert "The path of this folder contains one of" in done.stderr
     assert not list(tmp_path.rglob("owned"))
 
 
-def test_a_folder_with_a_control_character_is_told_without_it(tmp_path):
+def test_a_folder_with_a_control_character_is_reported_without_it(tmp_path):
     done = make(clone(tmp_path / "a\x1b[31mb"), "check")
     assert done.returncode == 2
     assert "a?[31mb" in done.stderr

@@ -30,7 +30,7 @@ LONG = {
     "backlog keeps each item, 16 items",
     "pins never meet, 2x1, shortest times",
     "pins never meet, 2x1, guard lines, row2col, shortest times",
-    "whole lines are not told, 3x2",
+    "whole lines are not reported, 3x2",
     "frames of a line reversal, 8x2",
     "a closed switch is reported, 8x4",
     "the next frame in time, 8x2, long times",
@@ -87,7 +87,8 @@ def test_a_planted_bug_breaks_the_claim(case, bug):
 
 @pytest.mark.parametrize("case", upset.CASES, ids=lambda case: case.size)
 def test_each_register_that_turns_by_itself_is_found(case):
-    """Of those that are watched. Nothing else shows that they are, as none turns in other tests."""
+    """Each watched register is flipped and found. Nothing else shows that they are watched, as none flips in other
+    tests."""
     assert {bug.name: case.run_with(bug).outcome for bug in case.bugs} == dict.fromkeys(
         (bug.name for bug in case.bugs), "counterexample"
     )

@@ -41,7 +41,7 @@ def sample():
 
 @pytest.mark.slow
 def test_short_stimuli_kill_most_mutants(sample, record_property):
-    """Not even counting those that are no change, which only a proof can tell."""
+    """Short stimuli kill most mutants, even if equivalent mutants, which only a proof can tell, count as alive."""
     assert len(sample.left) <= 0.25 * SAMPLE
     record_property("cases", SAMPLE)
 
@@ -89,7 +89,8 @@ def test_no_noise_comes_where_pulses_are_bits():
     ],
 )
 def test_stimuli_of_units_notice_amounts_one_off_and_thresholds_without_a_bit(monkeypatch, skin, wrong):
-    """Sum 2 of this Skin never reaches 2**15. Its thresholds may have more bits."""
+    """Stimuli reach amounts at a threshold and one beside it. Sum 2 of this Skin never reaches 2**15, but its
+    thresholds may have more bits."""
     skin = OPTIONS[skin][0]
     timeline, cycles = stimuli.thresholds(skin, 240)
     asked = heard(timeline.received, facts(skin).bit_clocks, commands=True).requests
@@ -130,7 +131,7 @@ def test_without_a_stimulus_every_mutant_survives(sample):
 
 
 @pytest.mark.slow
-def test_what_time_was_too_short_for_is_open_and_neither_told_nor_proved(monkeypatch, sample):
+def test_what_time_was_too_short_for_is_open_and_neither_reported_nor_proved(monkeypatch, sample):
     monkeypatch.setattr(netlist, "draw", lambda *_: sample.mutants)
     found = campaign.examine("8x8", SAMPLE, 0, budget_s=0.0)
     assert [one.mutant for one in found if one.fate == "open"] == sample.left
@@ -160,10 +161,10 @@ def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=1)
     left = campaign.left_by(skin, mutants, stimuli.quick(skin))
     killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
-    told = [killed[stage] for stage in ("label", "link")]
-    proved = proof.equivalent(skin, [*told, *left[:6]], limit_s=4)
-    assert not any(proved[: len(told)])
-    assert any(proved[len(told) :])
+    noticed = [killed[stage] for stage in ("label", "link")]
+    proved = proof.equivalent(skin, [*noticed, *left[:6]], limit_s=4)
+    assert not any(proved[: len(noticed)])
+    assert any(proved[len(noticed) :])
 
 
 @pytest.mark.campaign

@@ -218,7 +218,7 @@ def test_an_unknown_way_to_pack_is_damaged():
 
 
 @pytest.mark.parametrize("links", [[str(number) for number in range(MAX_LINKS + 1)], ["x" * (MAX_NAME + 1)]])
-def test_too_many_links_or_names_too_long_are_told(tmp_path, links):
+def test_too_many_links_or_names_too_long_are_reported(tmp_path, links):
     """Each link is read on its own, and its name stands in each row of a table."""
     path = tmp_path / "x.mcap"
     path.write_bytes(mcap([chunk("zstd", 1000)], links))

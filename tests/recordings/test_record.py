@@ -90,7 +90,7 @@ def test_a_file_of_bytes_alone_has_the_times_of_its_board(tmp_path):
     assert (tmp_path / "x.csv").read_text().count("palm") >= len(frames)
 
 
-def test_a_file_of_an_older_protocol_is_told(tmp_path):
+def test_a_file_of_an_older_protocol_is_reported(tmp_path):
     (tmp_path / "x.rec").write_bytes(old_hello() + old_frame())
     with pytest.raises(contactfpga.VersionMismatch, match=r"x\.rec speaks protocol version 1, this host version 2"):
         Recording(tmp_path / "x.rec").frames()
@@ -118,9 +118,9 @@ def test_programs_of_others_read_the_messages(tmp_path):
         found = [(c.topic, t, reader.deserialize(raw, c.msgtype)) for c, t, raw in reader.messages()]
     zones = [message for topic, _, message in found if topic == "/left_hand/zones"]
     assert len(zones) == link.frames
-    told = replayed(tmp_path / "touches.mcap")[-len(zones) :]
-    assert [one.device_time_us for one in zones] == [one["time_us"] for one in told]
-    assert [one.zones[0].sum_x for one in zones] == [one["zones"][0]["sum_x"] for one in told]
+    reported = replayed(tmp_path / "touches.mcap")[-len(zones) :]
+    assert [one.device_time_us for one in zones] == [one["time_us"] for one in reported]
+    assert [one.zones[0].sum_x for one in zones] == [one["zones"][0]["sum_x"] for one in reported]
     assert {one.header.frame_id for one in zones} == {"left hand"}
     data = b"".join(bytes(message.data) for topic, _, message in found if topic == "/left_hand/bytes")
     assert data == port.sent
@@ -154,10 +154,10 @@ def test_units_and_faults_are_messages(tmp_path):
         session.start()
         wait_until(lambda: session.wait(0.005) or not port.left)
     with AnyReader([tmp_path / "x.mcap"]) as reader:
-        told = [
+        reported = [
             reader.deserialize(raw, c.msgtype).names for c, _, raw in reader.messages() if c.topic == "/skin/faults"
         ]
-    assert [name for names in told for name in names]
+    assert [name for names in reported for name in names]
 
 
 # ---- the command

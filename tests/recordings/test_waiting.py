@@ -19,7 +19,7 @@ from contactfpga.tools.recordings.link_recorder import LinkMessages
 
 
 @pytest.mark.parametrize("end_s", [0.05, 60.0])
-def test_each_has_a_message_or_is_told(monkeypatch, tmp_path, end_s):
+def test_each_has_a_message_or_is_reported(monkeypatch, tmp_path, end_s):
     """Writing is slow, until the end where there is time then."""
     write, ends = LinkMessages.frame, threading.Event()
 
@@ -38,13 +38,13 @@ def test_each_has_a_message_or_is_told(monkeypatch, tmp_path, end_s):
         (link,) = session.links
         wait_until(lambda: link.frames > 5 and len(link._events._frames) > 60)
         ends.set()
-    told = sum(int(re.search(r"(\d+) frames came faster", note)[1]) for note in link.notes)
-    assert (told > 10) == (end_s < 1)
+    reported = sum(int(re.search(r"(\d+) frames came faster", note)[1]) for note in link.notes)
+    assert (reported > 10) == (end_s < 1)
     assert link.frames > 5
-    told_us = messages(file)
-    assert len(told_us) == link.frames
-    assert times_us(file)[: link.frames] == told_us
-    assert len(times_us(file)) == link.frames + told
+    reported_us = messages(file)
+    assert len(reported_us) == link.frames
+    assert times_us(file)[: link.frames] == reported_us
+    assert len(times_us(file)) == link.frames + reported
 
 
 def times_us(file):

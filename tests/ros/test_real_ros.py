@@ -91,8 +91,8 @@ def test_ros_reads_what_we_publish_without_ros(ros, port):
     check(found)
     for topic in TOPICS.values():
         if topic.name != "wrench":
-            (told,) = found["hashes"][topic.resolved("skin")]
-            assert type_hash(topic.type).removeprefix("RIHS01_") in told.lower()
+            (published,) = found["hashes"][topic.resolved("skin")]
+            assert type_hash(topic.type).removeprefix("RIHS01_") in published.lower()
 
 
 def test_the_node_publishes_and_follows_its_lifecycle(ros, port):

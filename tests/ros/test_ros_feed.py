@@ -5,7 +5,7 @@ import types
 import pytest
 import ros_messages
 from ros_messages import hello
-from tracked import SKIN, frame
+from tracker_frames import SKIN, frame
 
 from contactfpga import Skin
 from contactfpga.driver.stats import Stats

@@ -7,7 +7,7 @@ import pytest
 import ros_messages
 from ros_messages import HEAD, hello, samples
 from rosbags.typesys import get_types_from_msg
-from tracked import SKIN, frame
+from tracker_frames import SKIN, frame
 
 import contactfpga
 from contactfpga import Skin

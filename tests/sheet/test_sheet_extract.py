@@ -9,7 +9,7 @@ import pytest
 from contactfpga import Skin
 from contactfpga.design.circuit import Circuit, load_circuit
 from contactfpga.design.sheet import SheetError, extract, files, lay_out
-from contactfpga.design.sheet.drawn import Drawing
+from contactfpga.design.sheet.drawing import Drawing
 
 EPS0 = 8.8541878128e-3  # pF/mm
 

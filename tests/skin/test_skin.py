@@ -65,7 +65,7 @@ def test_what_just_keeps_the_limits_is_taken(changes):
     assert all(getattr(skin, name) == value for name, value in changes.items() if name != "mask")
 
 
-def test_limits_are_told_by_field():
+def test_limits_are_reported_by_field():
     assert Skin.limits("rows") == Skin(rows=8).limits("columns") == (1, 64, "")
     assert Skin.limits("baud") == (1200, 200_000_000, "bits per second")
     with pytest.raises(KeyError):

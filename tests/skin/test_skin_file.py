@@ -263,16 +263,16 @@ def test_a_value_that_cannot_be_is_named_with_its_file(tmp_path):
 def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
     page = (Path(__file__).resolve().parents[2] / "docs/skin.md").read_text(encoding="utf-8")
     (rows,) = re.findall(rf"^\| `\[{re.escape(table)}\]` .*\n\|[-|]+\|\n((?:\|.*\n)+)", page, re.MULTILINE)
-    told = dict(re.findall(r"^\| `(\w+)` \| ?([^|]*?) ?\|", rows, re.MULTILINE))
+    defaults = dict(re.findall(r"^\| `(\w+)` \| ?([^|]*?) ?\|", rows, re.MULTILINE))
     fields = {field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap")}
-    assert told.keys() == fields.keys()
+    assert defaults.keys() == fields.keys()
     for name, default in fields.items():
         if default is None:
-            assert told[name] == "none"
+            assert defaults[name] == "none"
         elif default is dataclasses.MISSING:
-            assert told[name] == ""
+            assert defaults[name] == ""
         else:
-            assert tomllib.loads(f"x = {told[name].strip('`')}")["x"] == default
+            assert tomllib.loads(f"x = {defaults[name].strip('`')}")["x"] == default
 
 
 def test_the_example_of_tiles_is_the_cover_of_the_page():

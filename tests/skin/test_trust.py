@@ -172,25 +172,25 @@ def test_the_texts_of_a_recording_import_nothing(mark, tmp_path, monkeypatch, ca
     pytest.importorskip("amaranth")
     pytest.importorskip("mcap")
     from contactfpga.recordings import Recording
-    from contactfpga.robot.body import packed
+    from contactfpga.robot.body import robot_texts
 
     evil = f'"l\\u0061beller" = "{NAMED}"\n'
     (tmp_path / "skin.toml").write_text(Skin().to_toml())
     robot(tmp_path, port="sim://?scene=fingertip")
-    pack = packed.pack
+    pack = robot_texts.pack
     with monkeypatch.context() as patched:
         patched.setattr(Skin, "to_toml", lambda skin: evil)
         patched.setattr(
-            packed, "pack", lambda path: pack(path) | {"links.0.skin": base64.b64encode(evil.encode()).decode()}
+            robot_texts, "pack", lambda path: pack(path) | {"links.0.skin": base64.b64encode(evil.encode()).decode()}
         )
         assert cli.main(["record", "out.mcap", "robot.toml", "--seconds", "0.05"]) == 0
     recording = Recording("out.mcap")
     assert recording.skins == {"arm": None}
     assert "<table" in recording._repr_html_()
-    (texts,) = recording.texts(packed.ROBOT)
+    (texts,) = recording.texts(robot_texts.ROBOT)
     (tmp_path / "unpacked").mkdir()
     with pytest.raises(BodyError, match="--trust"):
-        packed.unpack(texts, tmp_path / "unpacked")
+        robot_texts.unpack(texts, tmp_path / "unpacked")
     assert cli.main(["export", "out.mcap", "out.npz"]) == 0
     assert cli.main(["record", "--recover", "out.mcap"]) == 0
     assert cli.main(["zones", "--once", "replay://out.mcap"]) == 0

@@ -5,14 +5,14 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from fits import Shortcuts
 
-from contactfpga_sim.apps import kept, pool, speed
+from contactfpga_sim.apps import pool, result_cache, speed
 from contactfpga_sim.apps.fit import cost
 
 
 @pytest.fixture
 def alone(tmp_path, monkeypatch):
     """Results of this test only, in threads of this process."""
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "kept")
     monkeypatch.setattr(pool, "executor", lambda jobs, dask: ThreadPoolExecutor(1))
 
 

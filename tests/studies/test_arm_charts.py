@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from contactfpga.tools import cli
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.arm import pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
@@ -21,7 +21,7 @@ PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 @pytest.fixture
 def nothing_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "kept")
 
 
 def test_safe_speed_lies_where_the_worst_force_so_far_crosses_the_limit():

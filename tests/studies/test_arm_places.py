@@ -13,7 +13,7 @@ from scipy.stats import binom
 from contactfpga.design.cover import Ball, cells_of
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.arm import anywhere, places
 from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
 from contactfpga_sim.lab.arm.case import Case
@@ -146,7 +146,7 @@ def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_says_what_touches_anywhere_come_to(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "kept")
     monkeypatch.setattr("contactfpga_sim.lab.arm.report.columns", lambda *given: {})
     monkeypatch.setattr("contactfpga_sim.lab.arm.report.as_json", lambda *given: {})
     assert cli.main(["study", "arm", "--json", "--places", "6", "--latency-us", "3000", "--jobs", "1"]) == 0

@@ -17,7 +17,7 @@ from study_pages import outdated
 from contactfpga.design.cover import Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.apps import errors, kept, speed, stats
+from contactfpga_sim.apps import errors, result_cache, speed, stats
 from contactfpga_sim.apps.errors import Blob
 from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
@@ -35,8 +35,8 @@ SMALL = METHODS["run, 20 mm, tiles"].skin
 
 @pytest.fixture(autouse=True)
 def results_of_this_test_only(tmp_path, monkeypatch):
-    compiled = kept.cache_folder()
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    compiled = result_cache.cache_folder()
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "kept")
     return compiled
 
 
@@ -264,7 +264,7 @@ def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     tasks = [task(checked=1), task("run, 10 mm, tiles", "bumper", 130)]
     with ThreadPoolExecutor(2) as pool:
         points = compute.study(tasks, pool, with_size=False)
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "others")
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "others")
     with (
         distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,

@@ -16,7 +16,7 @@ from contactfpga.design import kits
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet.caps import PLATE_MM, caps
-from contactfpga.design.sheet.drawn import BOARDS
+from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.parts import DOME
 from contactfpga.tools import cli
 from contactfpga_sim.apps.latency.stages import ASSUMED_HOST_US

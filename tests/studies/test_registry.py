@@ -15,7 +15,7 @@ from study_pages import DOCS, section
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import meaning, studies, writer
+from contactfpga_sim.lab import fingerprints, studies, writer
 from contactfpga_sim.lab.registry import Section, Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -206,8 +206,8 @@ def toy(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(studies, "STUDIES", {"toy": declared})
     monkeypatch.syspath_prepend(tmp_path)
-    meaning._of.cache_clear()
-    meaning._marks.cache_clear()
+    fingerprints._of.cache_clear()
+    fingerprints._marks.cache_clear()
     yield page
     for name in [name for name in sys.modules if name.partition(".")[0] == "toys"]:
         del sys.modules[name]
@@ -231,8 +231,8 @@ def test_a_study_writes_its_sections_and_draws(toy, monkeypatch, capsys):
 
 def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_else(toy, monkeypatch, capsys):
     def stale():
-        meaning._of.cache_clear()
-        meaning._marks.cache_clear()
+        fingerprints._of.cache_clear()
+        fingerprints._marks.cache_clear()
         assert run(monkeypatch, "--stale") == 0
         return [line for line in capsys.readouterr().out.splitlines() if line]
 
@@ -258,12 +258,12 @@ def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(m
     from contactfpga_sim.apps import size
     from contactfpga_sim.lab.closed import tables
 
-    monkeypatch.setattr(size.kept, "kept", None)  # nothing is measured
+    monkeypatch.setattr(size.result_cache, "cached", None)  # nothing is measured
     closed, skin_of = STUDIES["closed"], tables.skin_of
-    before = meaning.fingerprint(closed, "closed_size")
-    assert meaning.fingerprint(closed, "closed_size") == before
+    before = fingerprints.fingerprint(closed, "closed_size")
+    assert fingerprints.fingerprint(closed, "closed_size") == before
     monkeypatch.setattr(tables, "skin_of", lambda *given: skin_of(*given).replace(columns=12))
-    assert meaning.fingerprint(closed, "closed_size") != before
+    assert fingerprints.fingerprint(closed, "closed_size") != before
 
 
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):

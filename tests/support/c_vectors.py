@@ -69,8 +69,8 @@ def _stream(skin: Skin, seed: int) -> str:
     for index in range(5 if skin.zone_capacity == 2 else 4):
         data, words, cells, zones, flags = _frame(wire, rng, index, sent + index, heard)
         lines.append(_packet(data))
-        told = (2**22 + 100 * index, (sent + index) % 256, flags, heard % 8, cells, zones, 0)
-        lines.append(" ".join(map(str, ("frame", *told, *words))))
+        fields = (2**22 + 100 * index, (sent + index) % 256, flags, heard % 8, cells, zones, 0)
+        lines.append(" ".join(map(str, ("frame", *fields, *words))))
     if skin.units:
         lines.insert(2, "units 3 12 0 0 240 720")
         for index, readings in enumerate([(0, 2048, 4095), (1, 130, 4094)]):

@@ -32,7 +32,7 @@ class ModelBoard:
         self.overwritten = 0
         self.stuck = 0
         self.word = 0  # what it knows of its lines
-        self.told = None  # the number that a hello repeats, where what follows a request may hide it
+        self.repeated = None  # the number that a hello repeats, where what follows a request may hide it
         self._taken = 0
         self._heard_bytes = b""
 
@@ -52,8 +52,8 @@ class ModelBoard:
         return self.wire.zones(self.moments, flags=flags, **options)
 
     def hello(self, **options) -> bytes:
-        told = self.heard if self.told is None else self.told
-        state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": told, "stuck": self.stuck}
+        number = self.heard if self.repeated is None else self.repeated
+        state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": number, "stuck": self.stuck}
         return self.wire.hello(**state | options)
 
     def report(self) -> bytes:
@@ -79,7 +79,7 @@ class ModelBoard:
         self._taken += len(new)
         for number, _ in new:
             self.heard = number
-        self.told = found.numbers[-1][1] if found.numbers else 0
+        self.repeated = found.numbers[-1][1] if found.numbers else 0
         return new
 
 

@@ -32,7 +32,7 @@ def small(**fields) -> Skin:
 
 
 def checked_soon(monkeypatch, check_bit: int = 5, retry_bit: int = 8) -> None:
-    """A sheet at rest is checked every 2^check_bit us, and what is told is renewed every 2^retry_bit us."""
+    """A sheet at rest is checked every 2^check_bit us, and what is reported is renewed every 2^retry_bit us."""
     monkeypatch.setattr(reversal, "RETRY_BIT", retry_bit)
     monkeypatch.setattr(guard, "RETRY_US", 2**retry_bit)
     for module in (reversal, reversal_guard):

@@ -71,7 +71,7 @@ class Listener:
         return future.result()
 
     def hashes(self):
-        """Of each topic's publishers, as discovery told them."""
+        """Of each topic's publishers, as discovery reported them."""
         return {
             topic: sorted({str(found.topic_type_hash) for found in self.node.get_publishers_info_by_topic(topic)})
             for topic in TOPICS

@@ -7,7 +7,7 @@ import random
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from tracked import SKIN, frame
+from tracker_frames import SKIN, frame
 
 import contactfpga
 from contactfpga import Skin, Zones

@@ -72,7 +72,7 @@ class Streaming(DirectPort):
         return time.monotonic()
 
 
-class Plugged:
+class PluggedPorts:
     """Ports by name, for :class:`OpenBody`."""
 
     def __init__(self):

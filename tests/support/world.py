@@ -241,12 +241,12 @@ class Witness:
         """Faults of a flagged frame are some that the board had in this life, or have no name; others have none."""
         known = [names(word) for word in self.world.words[sent.life]] + [("unnamed fault",)]
         right = zones.faults in known if "fault" in zones.flags else zones.faults == ()
-        assert right, f"never told of this board: {zones.faults}"
+        assert right, f"never reported of this board: {zones.faults}"
 
-    def check_told(self, faults):
+    def check_reported(self, faults):
         """What a board said of its lines last, on a good line."""
         wanted = names(self.world.board.word)
-        assert (faults.names if faults else ()) == wanted, f"never told, though lines are {wanted}"
+        assert (faults.names if faults else ()) == wanted, f"never reported, though lines are {wanted}"
 
 
 def names(word):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tracked import events, ids
+from tracker_frames import events, ids
 
 from contactfpga import Skin, Tracker, Zones
 from contactfpga.wire.protocol import Frame, no_records

@@ -7,7 +7,7 @@ import random
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
-from tracked import SKIN, frame, moments, pressed, run
+from tracker_frames import SKIN, frame, moments, pressed, run
 
 from contactfpga import Tracker
 from contactfpga.tracking.assignment import assign
@@ -51,7 +51,7 @@ def history(seed, count=200):
 
 
 @pytest.fixture(scope="module", params=SEEDS)
-def told(request):
+def tracked(request):
     """What is said of a random history."""
     frames = history(request.param)
     return frames, run(Tracker(hold_ms=random.Random(request.param).choice([0, 5, 50])), frames)
@@ -61,8 +61,8 @@ def all_events(said):
     return [event for tracks in said for event in tracks.events]
 
 
-def test_ids_are_never_used_again_and_each_down_has_one_up(told):
-    _, said = told
+def test_ids_are_never_used_again_and_each_down_has_one_up(tracked):
+    _, said = tracked
     downs = [event.id for event in all_events(said) if event.kind == "down"]
     ups = [event.id for event in all_events(said) if event.kind == "up"]
     assert downs == sorted(set(downs))
@@ -70,8 +70,8 @@ def test_ids_are_never_used_again_and_each_down_has_one_up(told):
     assert len(downs) > 3
 
 
-def test_nothing_happens_to_a_contact_before_its_down_or_after_its_up(told):
-    _, said = told
+def test_nothing_happens_to_a_contact_before_its_down_or_after_its_up(tracked):
+    _, said = tracked
     open_ids = set()
     for event in all_events(said):
         if event.kind == "down":
@@ -83,8 +83,8 @@ def test_nothing_happens_to_a_contact_before_its_down_or_after_its_up(told):
             open_ids.discard(event.id)
 
 
-def test_events_and_frames_have_one_order_in_time(told):
-    frames, said = told
+def test_events_and_frames_have_one_order_in_time(tracked):
+    frames, said = tracked
     last = -1
     for zones, tracks in zip(frames, said):
         assert tracks.time_us == zones.time_us
@@ -95,8 +95,8 @@ def test_events_and_frames_have_one_order_in_time(told):
         assert all(event.seen_us <= event.time_us for event in tracks.events)
 
 
-def test_each_id_is_in_one_place_and_each_zone_has_one_contact(told):
-    frames, said = told
+def test_each_id_is_in_one_place_and_each_zone_has_one_contact(tracked):
+    frames, said = tracked
     alive = set()
     for zones, tracks in zip(frames, said):
         for event in tracks.events:

@@ -5,7 +5,7 @@ import math
 import random
 
 import pytest
-from tracked import frame, run
+from tracker_frames import frame, run
 
 from contactfpga import Skin, Tracker
 
@@ -46,7 +46,7 @@ def joined(fingers):
     return zones
 
 
-def told(frames, change=lambda x, y: (x, y), order=list, later_us=0):
+def tracked(frames, change=lambda x, y: (x, y), order=list, later_us=0):
     """The frames, changed, and what a tracker says of them."""
     made = [
         frame(time_us + later_us, order([(*change(x, y), area) for x, y, area in zones]), skin=WIDE)
@@ -79,7 +79,7 @@ def same(one, other):
 def test_ids_do_not_depend_on_the_order_of_zones(seed):
     frames = list(walks(seed))
     rng = random.Random(seed)
-    plain, mixed = told(frames), told(frames, order=lambda zones: rng.sample(zones, len(zones)))
+    plain, mixed = tracked(frames), tracked(frames, order=lambda zones: rng.sample(zones, len(zones)))
     assert same(ids_at(*plain), ids_at(*mixed))
 
 
@@ -96,7 +96,7 @@ def test_ids_do_not_depend_on_the_order_of_zones(seed):
 )
 def test_ids_do_not_depend_on_where_the_sheet_begins_nor_on_a_mirror(seed, change, back):
     frames = list(walks(seed))
-    plain, changed = told(frames), told(frames, change)
+    plain, changed = tracked(frames), tracked(frames, change)
     assert same(ids_at(*plain), ids_at(*changed, back))
 
 
@@ -105,7 +105,7 @@ def test_ids_do_not_depend_on_where_the_sheet_begins_nor_on_a_mirror(seed, chang
 def test_ids_do_not_depend_on_when_the_board_began(seed, later_us):
     frames = list(walks(seed))
     kinds = [
-        [(event.kind, event.id, event.parents) for tracks in told(frames, later_us=late)[1] for event in tracks.events]
+        [(one.kind, one.id, one.parents) for tracks in tracked(frames, later_us=late)[1] for one in tracks.events]
         for late in (0, later_us)
     ]
     assert kinds[0] == kinds[1]

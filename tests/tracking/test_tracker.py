@@ -4,7 +4,7 @@ import json
 import math
 
 import pytest
-from tracked import SKIN, events, frame, ids, run
+from tracker_frames import SKIN, events, frame, ids, run
 
 from contactfpga import Skin, Tracker
 

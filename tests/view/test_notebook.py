@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tracked import frame, pressed
+from tracker_frames import frame, pressed
 
 from contactfpga import Skin
 from contactfpga.tracking.tracker import Tracker

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tracked import frame
+from tracker_frames import frame
 
 from contactfpga.robot.haptics import Contacts, LoadCells, Wrench, contacts
 from contactfpga.surfaces import CylinderSurface, PlaneSurface

@@ -14,7 +14,7 @@ from contactfpga.tools.view.server import Guard
 pytest.importorskip("viser")
 pytest.importorskip("websockets")
 
-from viewed import Page, camera, click, cookie, socket_of
+from view_page import Page, camera, click, cookie, socket_of
 from websockets.exceptions import InvalidStatus
 
 from contactfpga.tools.view import server as serving

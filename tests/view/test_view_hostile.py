@@ -11,7 +11,7 @@ from two_links import FLAT, ROBOT, ROUND, write_robot
 pytest.importorskip("viser")
 
 from contactfpga.recordings import Recording, Session
-from contactfpga.robot.body import packed
+from contactfpga.robot.body import robot_texts
 from contactfpga.tools import cli
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.panel import as_markdown
@@ -54,7 +54,7 @@ def record(folder, name):
     robot.write_text(text)
     file = folder / f"{name}<img src=x onerror=hostile=1>$x$.mcap"
     ports = {links["arm"]: StreamPort(ROUND, frames=100), links["chest"]: StreamPort(FLAT, frames=100)}
-    with Session(file, bytes_only=True, about={"robot": packed.pack(robot)}) as session:
+    with Session(file, bytes_only=True, about={"robot": robot_texts.pack(robot)}) as session:
         for link, port in ports.items():
             session.add(port, name=link)
         session.start()

@@ -9,7 +9,7 @@ pytest.importorskip("websockets")
 pytest.importorskip("amaranth")
 
 from fake_board import wait_until
-from viewed import Page, camera, click, drag
+from view_page import Page, camera, click, drag
 
 import contactfpga
 from contactfpga.tools.view import opening
@@ -106,7 +106,7 @@ def test_a_sheet_of_several_is_shown():
         wait_until(lambda: seen.append(source.poll()) or seen[-1])
         (zone,) = seen[-1].zones
         assert (source.sheet.rows, hand, zone.area_cells > 20) == (12, None, True)
-        late_us = float(dict(source.told())["latency"].split()[0].replace(",", ""))
+        late_us = float(dict(source.facts())["latency"].split()[0].replace(",", ""))
         assert late_us < 100_000, "on the board's clock, not on this computer's"
     finally:
         source.close()

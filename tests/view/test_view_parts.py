@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fake_board import wait_until
-from tracked import frame
+from tracker_frames import frame
 
 from contactfpga import Skin
 from contactfpga.driver import driver
@@ -219,7 +219,7 @@ def test_silence_is_said(board):
 
         def told(silent_s):
             port._link.last_s = port.clock() - silent_s
-            return dict(source.told())
+            return dict(source.facts())
 
         wait_until(lambda: "no data" not in told(0.0))
         wait_until(lambda: told(2.0)["no data"].startswith("for 2."))

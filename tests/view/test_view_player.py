@@ -8,8 +8,8 @@ from contactfpga import Skin, terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.tools import cli
 from contactfpga.tools.view import opening
+from contactfpga.tools.view.board_recording import load
 from contactfpga.tools.view.playback import Player
-from contactfpga.tools.view.replayed import load
 
 
 @pytest.fixture(scope="module")

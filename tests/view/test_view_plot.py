@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tracked import frame, pressed
+from tracker_frames import frame, pressed
 
 from contactfpga import Skin
 from contactfpga.tools.view.plot import STEPS, Touches

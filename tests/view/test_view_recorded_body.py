@@ -11,7 +11,7 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 pytest.importorskip("viser")
 
 from contactfpga.recordings import Recording, Session
-from contactfpga.robot.body import Body, BodyError, packed
+from contactfpga.robot.body import Body, BodyError, robot_texts
 from contactfpga.robot.body.snapshot import on_link
 from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.view import opening, picture
@@ -29,7 +29,7 @@ def record(folder, about=None):
     ports = {"arm": StreamPort(ROUND, frames=1000), "chest": StreamPort(FLAT, frames=200)}
     with pytest.MonkeyPatch.context() as changed:
         changed.setattr(link_recorder, "offset_ns", lambda *clocks: 10**18)
-        with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
+        with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or robot_texts.pack(path)}) as session:
             for name, port in ports.items():
                 session.add(port, name=name)
             session.start()
@@ -95,7 +95,7 @@ def test_where_sheets_lie_is_in_the_recording(file, player, tmp_path):
 def test_tables_and_units_are_kept_too(tmp_path):
     path = with_units(write_robot(tmp_path))
     (tmp_path / "there").mkdir()
-    body = packed.unpack(packed.pack(path), tmp_path / "there")
+    body = robot_texts.unpack(robot_texts.pack(path), tmp_path / "there")
     np.testing.assert_array_equal(body.links["chest"].units.matrix, Body.load(path).links["chest"].units.matrix)
 
 
@@ -109,10 +109,10 @@ def test_tables_and_units_are_kept_too(tmp_path):
     ],
 )
 def test_a_robot_that_is_not_whole_is_refused_in_one_line(tmp_path, change, says):
-    texts = packed.pack(write_robot(tmp_path))
+    texts = robot_texts.pack(write_robot(tmp_path))
     change(texts)
     with pytest.raises(BodyError, match=says):
-        packed.unpack(texts, tmp_path)
+        robot_texts.unpack(texts, tmp_path)
 
 
 def unhurried(player):

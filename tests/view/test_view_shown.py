@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from tracked import frame, moments
+from tracker_frames import frame, moments
 
 from contactfpga import Skin
 from contactfpga.tools.view import cameras, chart, contacts, glow, limb, page, panel, picture, ruler
@@ -175,11 +175,11 @@ def test_a_simulated_board_says_its_speed_only_where_it_lags(board):
 
     with contactfpga.open(board.path, timeout=60.0) as port:
         source = BoardSource(port, "board")
-        assert dict(source.told())["lost"] == "nothing"
+        assert dict(source.facts())["lost"] == "nothing"
         source._pace = SimpleNamespace(share=1.0)
-        assert "simulated" not in dict(source.told())
+        assert "simulated" not in dict(source.facts())
         source._pace = SimpleNamespace(share=0.4)
-        assert dict(source.told())["simulated"].startswith("at 40% of real time")
+        assert dict(source.facts())["simulated"].startswith("at 40% of real time")
 
 
 def test_the_panel_names_no_color_twice():

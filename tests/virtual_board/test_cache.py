@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.model.board import cache
 from contactfpga_sim.model.board.cache import CacheError
 
@@ -35,8 +35,8 @@ def test_modes_do_not_depend_on_the_umask(tmp_path, monkeypatch):
     folder = cache.ready(tmp_path / "a" / "b")
     with cache.locked(folder / "x.lock"), cache.scratch(folder, "build") as work:
         assert mode(work) == 0o700
-    monkeypatch.setattr(kept, "cache_folder", lambda: folder)
-    kept.kept("kind", "key", lambda: 1)
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: folder)
+    result_cache.cached("kind", "key", lambda: 1)
     assert [mode(path) for path in (folder, folder.parent)] == [0o700] * 2
     assert {mode(path) for path in folder.iterdir()} == {0o600}
 
@@ -136,7 +136,7 @@ def test_links_are_not_followed(tmp_path):
     assert target.read_text() == "x"
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path):
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(CacheError, match=r"cannot be used: .*; name another folder with CONTACTFPGA_CACHE"):
         cache.ready(tmp_path / "file" / "cache")
@@ -181,7 +181,7 @@ print(native.load(native.Model("the answer", "label.cpp", "answer", None)).answe
 
 
 def answer(folder):
-    """What a process says that loads a library from the cache, and makes it there is none."""
+    """Status and output of a process that loads a library from the cache, and makes it if there is none."""
     environment = os.environ | {"CONTACTFPGA_CACHE": str(folder)}
     command = [sys.executable, "-c", ANSWER]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=250, check=False)
@@ -211,8 +211,8 @@ def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
     good = library.read_bytes()
     for what, damaged in damages():
         library.write_bytes(damaged(good))
-        told = f"contactfpga: {library} in the cache is damaged; it is made again\n"
-        assert answer(tmp_path) == (0, ["built", "42"], told), what
+        warning = f"contactfpga: {library} in the cache is damaged; it is made again\n"
+        assert answer(tmp_path) == (0, ["built", "42"], warning), what
         assert library.read_bytes() == good, what
     assert answer(tmp_path) == (0, ["42"], "")
 
@@ -225,24 +225,24 @@ def test_a_library_without_its_sum_is_built_again(tmp_path, damaged):
         total.unlink()
     else:
         total.write_bytes(damaged)
-    status, said, told = answer(tmp_path)
+    status, said, warning = answer(tmp_path)
     assert (status, said) == (0, ["built", "42"])
-    assert "is damaged; it is made again" in told
+    assert "is damaged; it is made again" in warning
     total.chmod(0o666)
-    status, said, told = answer(tmp_path)
+    status, said, warning = answer(tmp_path)
     assert status == 1
-    assert "can be written by others (mode 666)" in told
+    assert "can be written by others (mode 666)" in warning
 
 
 def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path))
-    assert kept.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+    assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
     (path,) = tmp_path.glob("*.json")
     for damaged in (b"", b"[1, 2", b"[1, 23]"):
         path.write_bytes(damaged)
-        assert kept.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+        assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
         assert capsys.readouterr().err == f"contactfpga: {path} in the cache is damaged; it is made again\n"
-    assert kept.kept("kind", "key", lambda: 5) == [1, 22]
+    assert result_cache.cached("kind", "key", lambda: 5) == [1, 22]
 
 
 @pytest.mark.campaign  # it compiles a board in a cache of its own

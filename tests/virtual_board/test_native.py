@@ -93,12 +93,12 @@ def test_processes_that_start_together_share_one_build_and_later_ones_find_it_wi
         )
         for _ in range(3)
     ]
-    told = [run.communicate(timeout=200) for run in runs]
-    assert [run.returncode for run in runs] == [0, 0, 0], told
-    (received,) = {int(out.splitlines()[0]) for out, _ in told}
+    outputs = [run.communicate(timeout=200) for run in runs]
+    assert [run.returncode for run in runs] == [0, 0, 0], outputs
+    (received,) = {int(out.splitlines()[0]) for out, _ in outputs}
     assert received > 32
-    assert any("amaranth" in out for out, _ in told)
-    assert sum("building the 2x2 board" in err for _, err in told) == 1
+    assert any("amaranth" in out for out, _ in outputs)
+    assert sum("building the 2x2 board" in err for _, err in outputs) == 1
     assert len(list(tmp_path.glob("*.so"))) == 1
     assert not list(tmp_path.glob("build-*"))
     later = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=200)

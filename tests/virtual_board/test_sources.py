@@ -69,7 +69,7 @@ for line in ["", *sys.stdin.read().splitlines()]:
         file.write_bytes(before)
 assert "amaranth" not in sys.modules
 """
-SIZING = ("sizes.py", "placed.py", "synthesis.py", "tools.py")
+SIZING = ("sizes.py", "pnr_report.py", "synthesis.py", "tools.py")
 BOARD = "native.skin_key(skin)"
 CARRIED = "__import__('contactfpga_sim.model.board.compiled', fromlist=['']).carried_key(skin)"
 
@@ -83,7 +83,7 @@ def _own_memory(monkeypatch):
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """All sources, to be changed."""
+    """A copy of all sources, which the test may change."""
     folder = tmp_path_factory.mktemp("copy")
     for package, inside in PACKAGES.items():
         ignored = shutil.ignore_patterns("__pycache__")
@@ -92,7 +92,7 @@ def copy(tmp_path_factory):
 
 
 def run(folder, code, *arguments, said="", **environment):
-    """What Python says with the packages of ``folder``."""
+    """Output of Python with the packages of ``folder``."""
     path = os.pathsep.join(str(folder / inside) for inside in PACKAGES.values())
     environment = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"} | environment
     command = [sys.executable, "-c", code, *map(str, arguments)]
@@ -185,7 +185,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     ],
 )
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
-    key = f"__import__('contactfpga_sim.apps.kept', fromlist=['']).made_by({module!r})"
+    key = f"__import__('contactfpga_sim.apps.result_cache', fromlist=['']).made_by({module!r})"
     paths = [(copy / "sim/contactfpga_sim/lab" / name).resolve() for name in files]
     page = copy / "sim/contactfpga_sim/lab/flips/tables.py"
     now, changed = keys(copy, key, [*paths, page])
@@ -193,16 +193,16 @@ def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files
 
 
 def test_a_docstring_changes_no_kept_result(tmp_path, monkeypatch):
-    monkeypatch.setattr(sources, "_folders", lambda packages: {"told": tmp_path})
+    monkeypatch.setattr(sources, "_folders", lambda packages: {"package": tmp_path})
     text = '"""Of what."""\n\nWIDTH = 3\n"""How wide."""\n\n\ndef f():\n    """Say so."""\n    return """so"""\n'
     quiet = 'WIDTH = 3\ndef f():\n    return """so"""\n'
     louder = text.replace("How wide.", "How wide it is,\n\nin cells.").replace("Say so.", "Return so.")
 
     def key(text):
-        (tmp_path / "told.py").write_text(text)
+        (tmp_path / "package.py").write_text(text)
         sources._taken.clear()
         sources._undocumented.cache_clear()
-        return sources.digest("told", documented=False)
+        return sources.digest("package", documented=False)
 
     assert key(text) == key(quiet) == key(louder)
     assert len({key(text), key(text.replace("3", "4")), key(text.replace('"""so"""', '"""no"""'))}) == 3

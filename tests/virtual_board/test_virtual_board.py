@@ -83,8 +83,7 @@ def test_cells_of_another_size_are_refused():
 
 
 def read_until(path, enough):
-    """What a client reads that opens the port and stays until these bytes are ``enough``: as long as a busy machine
-    takes."""
+    """Bytes that a client reads until they are ``enough``, for as long as a busy machine takes."""
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
         tty.setraw(port)
@@ -117,9 +116,9 @@ def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
             asked, shown = time.monotonic(), board.clock()
             # So much that the board has compared its clock with real time after the question, however late it ran.
             wait_until(lambda: board.clock() > shown + 1.5 * pty_board.CHUNK_S)  # noqa: B023
-            told = board.clock() + board.slip
-            assert told <= time.monotonic() - earliest + 2 * pty_board.CHUNK_S
-            assert told >= asked - latest - pty_board.MAX_LAG_S
+            elapsed = board.clock() + board.slip
+            assert elapsed <= time.monotonic() - earliest + 2 * pty_board.CHUNK_S
+            assert elapsed >= asked - latest - pty_board.MAX_LAG_S
             time.sleep(0.05)
     assert board.failure is None
     assert not Path(board.port).exists() or board._master < 0
@@ -142,7 +141,7 @@ def test_what_nobody_reads_is_dropped_and_counted():
 
 
 @pytest.mark.parametrize(
-    ("skin", "share", "told"),
+    ("skin", "share", "advice"),
     [
         (
             Skin(),
@@ -153,8 +152,8 @@ def test_what_nobody_reads_is_dropped_and_counted():
         (Skin(), 0.95, "(5%): one second of the board takes 20.0 s, and times are the board's; a clock with which"),
     ],
 )
-def test_a_slow_board_says_which_clock_would_hold(skin, share, told):
-    assert told in pty_board.slip_told(skin, share)
+def test_a_slow_board_says_which_clock_would_hold(skin, share, advice):
+    assert advice in pty_board.slip_warning(skin, share)
 
 
 def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatch, capsys):
@@ -168,14 +167,14 @@ def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatc
 
     board._board.advance = drag  # before it starts: at most a fifth of real time from the first window on
     with board:
-        told = []
-        wait_until(lambda: told.append(capsys.readouterr().err) or "slower than real time" in "".join(told))
-        assert int(re.search(r"slower than real time \((\d+)%\)", "".join(told))[1]) < 50
+        errors = []
+        wait_until(lambda: errors.append(capsys.readouterr().err) or "slower than real time" in "".join(errors))
+        assert int(re.search(r"slower than real time \((\d+)%\)", "".join(errors))[1]) < 50
         slipped = board.slip
         assert slipped > 0.1
         wait_until(lambda: board.slip > slipped + 0.5)
-        told = "".join(told) + capsys.readouterr().err
-        assert told.count("slower than real time") == 1  # not every few seconds
+        errors = "".join(errors) + capsys.readouterr().err
+        assert errors.count("slower than real time") == 1  # not every few seconds
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -194,7 +193,7 @@ def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
 
 
 def test_signals_within_the_handler_of_another_end_it_too():
-    """One comes at each line of the handler, with all that it calls."""
+    """A second signal at each line of the handler of the first, or of functions that it calls, ends the board too."""
     board = PtyBoard(SLOW)
 
     def again(*_):
@@ -233,7 +232,7 @@ def test_a_missing_compiler_names_the_command_that_installs_it(monkeypatch):
         native.find_compiler()
 
 
-def test_a_compiler_that_refuses_is_told_and_leaves_nothing(monkeypatch, tmp_path):
+def test_a_compiler_that_refuses_is_reported_and_leaves_nothing(monkeypatch, tmp_path):
     monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path))
     monkeypatch.setenv("CXX", "false")
     with pytest.raises(native.CompileFailed, match="false"):

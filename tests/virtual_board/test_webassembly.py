@@ -1,5 +1,5 @@
-"""The boards that the package carries as WebAssembly: the same clocks as native code, and none where they are not of
-these sources. The oracle is the same C++, compiled by another compiler for another machine."""
+"""Boards that the package carries as WebAssembly do the same as native code in each clock; outdated ones are not used.
+The oracle is the same C++, compiled by another compiler for another machine."""
 
 import contextlib
 import ctypes
@@ -56,7 +56,7 @@ def both():
 
 
 def assert_alike(boards):
-    """All that was noted since it was taken last; returns how much."""
+    """Compare all events since the last call in both boards; returns their number."""
     one, other = ({name: board.take(name) for name in CAPTURABLE} for board in boards)
     for name in CAPTURABLE:
         np.testing.assert_array_equal(one[name], other[name], name)
@@ -185,7 +185,7 @@ def copy(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("cut", [1, 4000, 70_000])
-def test_a_truncated_file_is_told_and_not_run(copy, capsys, cut):
+def test_a_truncated_file_is_reported_and_not_run(copy, capsys, cut):
     file = copy / "reference.wasm"
     file.write_bytes(file.read_bytes()[:-cut])
     assert webassembly.load(compiled.carried_key(Skin())) is None
@@ -262,7 +262,7 @@ sys.exit(main())
 
 
 def alone(cache, *words, hidden=""):
-    """What a command says on a machine without a compiler, or any other program."""
+    """Output of a command on a machine without a compiler or any other program."""
     command = [sys.executable, "-c", HIDDEN, hidden, *words]
     environment = os.environ | {"PATH": str(cache), "CONTACTFPGA_CACHE": str(cache)}
     environment = {name: value for name, value in environment.items() if name != "CXX"}

@@ -45,8 +45,8 @@ class Line:
         """What arrives when the frame that is hit comes as these bytes: frames as text, and the counters."""
         host = Conversation("x")
         events = host.receive(self.hello + self.before + hit + self.behind, 0.0)
-        told = [repr(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in frames_in(events)]
-        return told, host.stats
+        reported = [repr(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in frames_in(events)]
+        return reported, host.stats
 
     def lost(self, hit):
         """Numbers of the frames that do not arrive; whatever arrives was sent, in order, and is counted right."""

@@ -135,8 +135,8 @@ def test_hellos_arrive(skin, send, pitch_y_mm, name, state):
     assert packet == protocol.encode_hello(skin, **state)
     hello = HelloReader().take(unsealed(packet, skin))
     assert hello.sheet == skin.sheet
-    told = (hello.fingerprint, hello.name, hello.clock_hz, hello.baud, hello.send)
-    assert told == (skin.fingerprint, name, skin.clock_hz, skin.baud, skin.send)
+    reported = (hello.fingerprint, hello.name, hello.clock_hz, hello.baud, hello.send)
+    assert reported == (skin.fingerprint, name, skin.clock_hz, skin.baud, skin.send)
     assert {key: getattr(hello, key) for key in state} == state
 
 

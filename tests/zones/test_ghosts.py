@@ -64,18 +64,18 @@ def number_of(cells):
 @pytest.mark.parametrize(
     ("rows", "columns"), sample([(3, 4), (4, 3), (1, 5), (5, 1), (2, 6)], quick=[(3, 4), (1, 5), (5, 1)])
 )
-def test_in_a_static_frame_exactly_what_can_be_a_ghost_is_told(rows, columns, record_property):
+def test_in_a_static_frame_exactly_what_can_be_a_ghost_is_reported(rows, columns, record_property):
     zones_skin, cells_skin = skin_of(rows, columns), skin_of(rows, columns, "cells")
     cases, flagged = 0, 0
     for shown, numbers in every_static_frame(rows, columns):
-        told = received(zones_skin, shown, shown)[1]
+        reported = received(zones_skin, shown, shown)[1]
         ghosts = sorted(
             (moments(zone), any(not number & number_of(zone) for number in numbers)) for zone in zones_of(shown)
         )
-        assert sorted(((zone.area_cells, zone.sum_x, zone.sum_y), zone.ghost) for zone in told) == ghosts
+        assert sorted(((zone.area_cells, zone.sum_x, zone.sum_y), zone.ghost) for zone in reported) == ghosts
         pairs = itertools.combinations(zones_of(shown), 2)
         spread = any((one.any(axis) & other.any(axis)).any() for one, other in pairs for axis in (0, 1))
-        assert told.flags == ({"ghost"} if spread else set())
+        assert reported.flags == ({"ghost"} if spread else set())
         bitmap = received(cells_skin, shown, shown)[1]
         all_of_them = 0xFFFF
         for number in numbers:
@@ -107,8 +107,8 @@ def test_no_ghost_is_missed_while_a_switch_changes(seed, record_property):
         still, shown, ghosts = changing(rng, 7, 6)
         bitmap = received(cells_skin, still, shown)[1]
         assert not (ghosts & ~bitmap.ghost_cells).any()
-        told = received(zones_skin, still, shown)[1]
-        suspects = {(zone.area_cells, zone.sum_x, zone.sum_y) for zone in told if zone.ghost}
+        reported = received(zones_skin, still, shown)[1]
+        suspects = {(zone.area_cells, zone.sum_x, zone.sum_y) for zone in reported if zone.ghost}
         for zone in zones_of(shown):
             if ghosts[zone].all():
                 assert moments(zone) in suspects

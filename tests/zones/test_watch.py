@@ -42,9 +42,9 @@ def test_moving_hands_alone_are_no_suspicion(report, seed):
 
 
 def due_us(spot, report, touches):
-    """When a watch must have told: for the time nothing touched the switch beside (for zones: as long as its zone must
-    stay the same, twice; for cells: for a tenth of it), and 8 cells elsewhere came and went meanwhile, counted from the
-    cells themselves."""
+    """Time by which a watch must have reported the switch at ``spot``: nothing touched its neighbors for the limit
+    (zones: twice, as long as its zone must stay the same; cells: for a tenth of it), and meanwhile 8 cells elsewhere
+    came and went, counted from the cells themselves."""
     y, x = np.mgrid[:16, :16]
     near = np.maximum(abs(y - spot[0]), abs(x - spot[1])) <= 1
     start, steps = 0, round(STUCK_S * RATE_HZ)
@@ -75,10 +75,10 @@ def test_a_stuck_switch_is_found_in_the_time_stated(report, seed):
     due = due_us(spot, report, touches)
     assert due is not None, "the history shows it to nobody"
     found, watch = watched(skin, stuck_at(touches, spot))
-    told = [one for one in found if one.cells == (spot,)]
-    assert told
-    assert told[0].kind == "stuck"
-    assert told[0].time_us <= due + 0.1e6
+    reported = [one for one in found if one.cells == (spot,)]
+    assert reported
+    assert reported[0].kind == "stuck"
+    assert reported[0].time_us <= due + 0.1e6
     assert {one.cells for one in found} == {(spot,)}  # and no other
     if report == "cells":
         assert len(found) == 1
@@ -146,7 +146,7 @@ def test_an_arm_that_rests_while_hands_move_is_one_clear_line_and_no_mask(report
     assert watch.mask_line == ""
 
 
-def test_a_stuck_switch_under_a_resting_arm_is_told_once_the_arm_is_gone():
+def test_a_stuck_switch_under_a_resting_arm_is_reported_once_the_arm_is_gone():
     cells = resting(round(30 * RATE_HZ))
     cells[len(cells) // 2 :] = False
     elsewhere = moving_touches(np.random.default_rng(7), CELLS, 30.0)
@@ -218,16 +218,16 @@ def test_times_do_not_reach_back_before_a_restart():
     assert early + late == []
 
 
-@pytest.mark.parametrize(("period", "told"), [(2, True), (20, False)])
-def test_a_switch_that_flutters_is_told_and_one_that_is_tapped_is_not(period, told):
+@pytest.mark.parametrize(("period", "reported"), [(2, True), (20, False)])
+def test_a_switch_that_flutters_is_reported_and_one_that_is_tapped_is_not(period, reported):
     """At 200 frames per s: 200 changes per s, every 5 ms, and 10 taps per s."""
     cells = np.zeros((600, 16, 16), bool)
     phase = np.arange(600) % period
     cells[:, 2, 3] = phase < period // 2
     watch = Watch(CELLS)
     found = [one for zones in frames(CELLS, cells, 200.0) for one in watch.update(zones)]
-    assert [one.kind for one in found] == (["flutter"] if told else [])
-    assert watch.fluttering == (((2, 3),) if told else ())
+    assert [one.kind for one in found] == (["flutter"] if reported else [])
+    assert watch.fluttering == (((2, 3),) if reported else ())
     assert all("cell (2, 3) changes at least 100 times per s" in one.sentence for one in found)
 
 

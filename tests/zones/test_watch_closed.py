@@ -44,16 +44,16 @@ def test_something_that_lies_on_the_seam_is_not_taken_for_stuck_switches(shift):
     assert f"4 cells about ({'6, 6' if shift == 0 else '6, 0'})" in one.sentence
 
 
-def test_a_stuck_switch_is_told_at_the_same_time_wherever_the_seam_lies():
+def test_a_stuck_switch_is_reported_at_the_same_time_wherever_the_seam_lies():
     """Also where something beside it, over the seam, was touched lately."""
     cells = beside(1)
     cells[:, 5, 5] = True
     cells[150:330:4, 5, 4] = True  # a finger that taps beside it
-    told, _, _ = watched(cells, 0)
-    assert [(kind, where) for kind, _, where in told] == [("stuck", {(5, 5)})]
-    assert told[0][1] > 330 / RATE_HZ * 1e6
+    reported, _, _ = watched(cells, 0)
+    assert [(kind, where) for kind, _, where in reported] == [("stuck", {(5, 5)})]
+    assert reported[0][1] > 330 / RATE_HZ * 1e6
     for shift in (10, 11, 12):
-        assert watched(cells, shift)[0] == told
+        assert watched(cells, shift)[0] == reported
 
 
 def sent(zones, time_us):
@@ -77,7 +77,7 @@ def finger(rows, columns):
 
 
 @pytest.mark.parametrize(("turned", "name"), [(16, "a ring"), (511, "wound")])
-def test_a_zone_around_the_sheet_that_lies_there_is_told_without_an_x(turned, name):
+def test_a_zone_around_the_sheet_that_lies_there_is_reported_without_an_x(turned, name):
     (one,), watch = watched_zones((16, 120, 80, turned), finger(range(12, 16), range(16)))
     assert one.kind == "held"
     assert "x " not in one.sentence
@@ -98,7 +98,7 @@ def test_what_touches_a_zone_over_the_seam_is_nowhere_else(column):
     assert (one.kind, watch.stuck) == ("stuck", ((5, column),))
 
 
-def test_a_stuck_switch_that_a_contact_over_the_seam_joins_stays_told():
+def test_a_stuck_switch_that_a_contact_over_the_seam_joins_stays_reported():
     watch = Watch(MOMENTS, stuck_s=5.0)
     others = finger(range(4, 7), range(5, 11))
     for step in range(240):

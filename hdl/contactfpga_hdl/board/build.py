@@ -15,7 +15,7 @@ from amaranth.build.run import BuildPlan
 from contactfpga.boards.spec import NAME, BoardSpec, bitstream_path
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_hdl.board import placed, synthesis
+from contactfpga_hdl.board import pnr_report, synthesis
 from contactfpga_hdl.board.board_top import BoardTop, SheetsTop, platform_for
 from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
@@ -25,7 +25,7 @@ _TOOLS = {
 }
 
 # A miss of timing is reported here, with the figures; nextpnr would end before it writes them.
-_NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
+_NEXTPNR = f"--report {pnr_report.FILE} --timing-allow-fail"
 
 LIMIT_S = 900
 """Timeout: for some seeds the router never ends; successful builds take up to two minutes."""
@@ -36,7 +36,7 @@ CROWDED = 0.8
 """Used share of a resource above which it is blamed for a failed placement."""
 
 
-def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
+def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> pnr_report.Report:
     """Build the bitstream of one or several sheets in ``folder``. Raises BitstreamFailed if the design does not fit or
     misses its timing.
 
@@ -45,13 +45,13 @@ def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -
     plan = plan_for(board, skin, seed)
     folder = folder.resolve()
     bitstream = bitstream_path(board, folder)
-    for stale in (bitstream, folder / placed.FILE, folder / LOG):
+    for stale in (bitstream, folder / pnr_report.FILE, folder / LOG):
         stale.unlink(missing_ok=True)
     plan.extract(str(folder))
     for name, text in _described(skin).items():
         (folder / name).write_text(text, encoding="utf-8")
     _run(folder, board, seed)
-    found = placed.read(folder, LOG)
+    found = pnr_report.read(folder, LOG)
     if not found.met:
         bitstream.unlink()
         raise BitstreamFailed(

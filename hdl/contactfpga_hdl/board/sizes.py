@@ -20,7 +20,7 @@ from amaranth.hdl import Cat, Elaboratable, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga_hdl.board import placed, synthesis
+from contactfpga_hdl.board import pnr_report, synthesis
 from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
 
@@ -78,7 +78,7 @@ class Netlists:
 
     @classmethod
     def of(cls, component: Callable[[], wiring.Component]) -> Netlists:
-        return cls(_rtlil(component()), _rtlil(Registered(component())))
+        return cls(_rtlil(component()), _rtlil(RegisterWrapper(component())))
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
@@ -135,9 +135,9 @@ def _folder() -> Iterator[Path]:
 
 
 def _fmax(folder: Path, device: Device, seed: int) -> float:
-    options = ("--report", placed.FILE, "--seed", str(seed), "--timing-allow-fail", "--freq", "12")
+    options = ("--report", pnr_report.FILE, "--seed", str(seed), "--timing-allow-fail", "--freq", "12")
     (folder / "log").write_text(_run(folder, *device.place, "--json", "netlist.json", *options))
-    return placed.read(folder, "log").fmax_mhz
+    return pnr_report.read(folder, "log").fmax_mhz
 
 
 def _synthesize(design: str, device: Device, folder: Path, before: tuple[str, ...] | None) -> None:
@@ -167,7 +167,7 @@ def _limited() -> dict[str, Any]:
     return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S + 10))}
 
 
-class Registered(wiring.Component):
+class RegisterWrapper(wiring.Component):
     """A component between registers, with two pins: a wide component has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):

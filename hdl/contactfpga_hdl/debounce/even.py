@@ -51,12 +51,14 @@ class Debounce(wiring.Component):
         press, release = derived.press_scans, derived.release_scans
         symmetric = self.skin.debounce == "sym_defer_pk"
         longest = max(press, release) if symmetric else release + 1 + max(0, press - 1)
+        # Rule of the method
         switch, phase = Switch(max(1, longest.bit_length() + symmetric)), Phase()
         row = Signal(range(self.skin.rows))
         if symmetric:
             _defer_both(m, switch, press, release)
         else:
             _eager_press(m, switch, press, release)
+        # Walk over the switches of a row
         last = walk_columns(m, self.skin, self.raw, self.rows, row, switch, phase)
         known = Signal()  # a whole frame was walked
         m.d.comb += switch.fresh.eq(~known)

@@ -44,6 +44,7 @@ class TimedDebounce(wiring.Component):
         passes = raw.valid & ~self.alone & walk.raw.ready
         enters = walk.raw.valid & walk.raw.ready
         now = Signal.like(self.now)  # kept, as the port goes on while a row is inside
+        # Time and number of the row inside
         with m.If(enters):
             m.d.sync += now.eq(self.now)
         if self.derived.skips:
@@ -52,6 +53,7 @@ class TimedDebounce(wiring.Component):
         else:
             with m.If(rows.valid & rows.ready):
                 m.d.sync += row.eq(Mux(rows.payload.last, 0, row + 1))
+        # Driven rows pass through the walk, others past it
         m.d.comb += [
             walk.raw.valid.eq(raw.valid & self.alone),
             walk.raw.payload.eq(raw.payload),

@@ -61,6 +61,7 @@ class Brackets(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
+        # Marks, a clock later
         late = Signal.like(self.marks)
         over, follows = late.over, late.follows
         found = {
@@ -71,6 +72,7 @@ class Brackets(wiring.Component):
             found["turned"] = _bit(late.over_back, late.first) | _bit(late.onto_back, late.number)
         with m.If(self.enable):
             m.d.sync += late.eq(self.marks)
+        # A word per mark: of the new row, and of the row before from the run on that is passed next
         for name, bits in found.items():
             known = Signal(_runs(self.derived), name=f"known_{name}")  # bit i for the new row's i-th run
             new = Signal.like(known, name=f"new_{name}")
@@ -133,6 +135,7 @@ class Join(wiring.Component):
         kept = Signal(self._group_layout)  # the group of the cluster being walked
         current = Signal(self._group_layout)
         number = Signal(range(_runs(self.derived)))  # of the step's new run
+        # Group of the walked cluster, and the run of the row before
         with m.If(~step.opens):
             m.d.comb += current.eq(kept)
         earlier, later = step.has_before & brackets.earlier, step.has_before & brackets.later
@@ -140,6 +143,7 @@ class Join(wiring.Component):
         begun = step.has_before & ~earlier  # the first run of its zone
         more, fewer = begun & later, earlier & ~later
         turns = None
+        # Turns of a sheet whose ends meet
         if self.derived.skin.closed:
             from contactfpga_hdl.label.around import Turns
 
@@ -150,6 +154,7 @@ class Join(wiring.Component):
             pop, fewer = pop | turns.seam & (stack.level != 0), fewer | turns.seam
             turns.find(m, current.turn, earlier, pop, Const(0), brackets.turned)
             turns.keep(m, works & step.has_before, earlier, later)
+        # Waiting group that joins, new run, and whether the group waits
         joined = self._take_in(m, current, pop, stack.top, turns)
         group = self._add_run(m, joined, number)
         # Whether the group is open is known before the number of its open zones is.
@@ -167,11 +172,13 @@ class Join(wiring.Component):
         with m.If(works):
             m.d.comb += brackets.marks.eq(self._mark(current, pop, stack.top, joined, number, turns))
             m.d.sync += [kept.eq(group), number.eq(Mux(step.row_done, 0, number + step.has_run))]
+        # Fate of the zone
         decided = self._decide(m, group, push)
         if turns is not None:
             shares = {"begun": begun, "down": turns.down, "turn": turns.turn, "ring": turns.ring}
             m.d.comb += [decided[name].eq(share) for name, share in shares.items()]
             m.d.comb += decided.first_turn.eq(group.first_turn)
+        # Places in the table, of what is loaded and of what is stored
         place, level = Signal(place_bits(self.derived)), Signal(place_bits(self.derived))
         pushed = Signal()  # by the step before
         m.d.comb += [

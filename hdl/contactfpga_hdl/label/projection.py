@@ -5,7 +5,7 @@ cells above one run are one zone. So two contacts whose shadows touch are merged
 connected contact is never split; the moments of these zones are exact.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
@@ -31,12 +31,7 @@ class ProjectionLabeller(wiring.Component):
         m = Module()
         enable = Signal()  # no record waits
         m.d.comb += enable.eq(~self.records.valid | self.records.ready)
-        step, column, y = self._walk_columns(m, enable)
-        added, total = self._add_cells(m, enable, step, column, y)
-        self._let_out(m, enable, added, total)
-        return m
-
-    def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
+        # Walk over the columns of a row and of its band's shadow
         step = Signal(_step_layout())
         column = Signal(range(max(2, self.derived.skin.columns)))
         y = Signal(range(max(2, self.derived.skin.rows)))
@@ -78,12 +73,7 @@ class ProjectionLabeller(wiring.Component):
                 column.eq(0),
                 y.eq(number),
             ]
-        return step, column, y
-
-    def _add_cells(
-        self, m: Module, enable: Value, step: data.View, column: Value, y: Value
-    ) -> tuple[data.View, data.View]:
-        """Each column's moments in the band, one clock after the walk."""
+        # Each column's moments in the band, one clock after the walk
         layout = moments_layout(self.derived)
         m.submodules.sums = sums = memory.Memory(shape=layout, depth=self.derived.skin.columns, init=[])
         read, write = sums.read_port(), sums.write_port()
@@ -101,18 +91,17 @@ class ProjectionLabeller(wiring.Component):
         added, total = Signal.like(step), Signal(layout)
         with m.If(enable):
             m.d.sync += [added.eq(read_step), total.eq(write.data)]
-        return added, total
-
-    def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
+        # Zones: the columns of one run, added up
         kept, zone = Signal.like(total), Signal.like(total)
-        closes = step.valid & step.closes
-        leaves = closes & (step.cell | step.shadow) & step.stop
+        ends_band = added.valid & added.closes
+        leaves = ends_band & (added.cell | added.shadow) & added.stop
         for name in ("area", "sum_x", "sum_y"):
             m.d.comb += zone[name].eq(kept[name] + total[name])
         with m.If(enable):
-            m.d.sync += kept.eq(Mux(closes & ~leaves, zone.as_value(), 0))
+            m.d.sync += kept.eq(Mux(ends_band & ~leaves, zone.as_value(), 0))
         m.d.comb += [
-            self.records.valid.eq(leaves | step.end),
+            self.records.valid.eq(leaves | added.end),
             self.records.payload.zone.eq(zone),
-            self.records.payload.end.eq(step.end),
+            self.records.payload.end.eq(added.end),
         ]
+        return m

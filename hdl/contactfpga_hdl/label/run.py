@@ -77,9 +77,11 @@ class Sum(wiring.Component):
         moments = kept_layout(self.derived)
         join = self.join
         works = self.enable & self.valid & ~join.end
+        # Table of the zones of the row before, and of waiting groups
         m.submodules.table = table = memory.Memory(shape=moments, depth=2 << place_bits(self.derived), init=[])
         write = table.write_port()
         read = table.read_port()
+        # Moments of the group so far, of what joins it, and of the new run
         kept = Signal(moments)
         group = Signal(moments)
         stored = Signal(moments)
@@ -98,6 +100,7 @@ class Sum(wiring.Component):
             m.d.sync += [kept.eq(group), before.eq(group)]
             with m.If(join.closes):
                 m.d.sync += kept.eq(0)
+        # Table and records
         m.d.comb += [
             read.en.eq(self.enable),
             read.addr.eq(self.lookup),

@@ -92,8 +92,10 @@ class SerialLabeller(wiring.Component):
         later = Signal()
         m.submodules.earlier = earlier_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
         m.submodules.later = later_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
+        # Walk, a column at a time
         self._walk(m, walk, acts, around)
         self._cut(m, walk, acts, earlier & ~group.whole, around)
+        # Brackets of the run of the row before
         read_earlier = earlier_runs.read_port()
         read_later = later_runs.read_port()
         self._read_bracket(m, walk, acts, read_earlier)
@@ -114,6 +116,7 @@ class SerialLabeller(wiring.Component):
             self._nest(m, acts, group, earlier, later, found.below, around)
         if around is not None:
             self._go_around(m, acts, walk, group, found, earlier, around)
+        # Runs of the group, and their brackets
         self._know_runs(m, walk, acts, group, found)
         write = self._write_brackets(m, walk, acts, group, found, earlier_runs, later_runs)
         if around is not None:
@@ -123,6 +126,7 @@ class SerialLabeller(wiring.Component):
                 write_linked.addr.eq(write.addr),
                 write_linked.data.eq(around.link(group.has_run, acts.starts, found)),
             ]
+        # Moments
         self._sum(m, walk, acts, group, found)
         self._store_group(m, acts, group, groups, around)
         self._let_out(m, walk, acts, group)

@@ -31,6 +31,7 @@ class SingleLabeller(wiring.Component):
         leaves, ends, end = Signal(), Signal(), Signal()
         final = x == skin.columns  # a clock after the last column, so that the zone holds while it leaves
         m.d.comb += self.rows.ready.eq(enable & ~walks)
+        # Walk over the columns of a row
         with m.If(enable):
             m.d.sync += [leaves.eq(walks & final & last), ends.eq(~walks & last), end.eq(ends)]
             with m.If(leaves):
@@ -41,6 +42,7 @@ class SingleLabeller(wiring.Component):
                 m.d.sync += [zone.area.eq(zone.area + 1), zone.sum_x.eq(zone.sum_x + x), zone.sum_y.eq(zone.sum_y + y)]
         with m.Elif(enable):
             m.d.sync += last.eq(0)
+        # Next row
         taken = self.rows.valid & self.rows.ready
         number = row_number(m, self.derived, row, taken)
         with m.If(taken):
@@ -53,6 +55,7 @@ class SingleLabeller(wiring.Component):
                 pressed.eq(any_pressed & ~row.last),
                 walks.eq(row.cells.any() | row.last & any_pressed),
             ]
+        # Record
         m.d.comb += [
             self.records.valid.eq(leaves | end),
             self.records.payload.zone.eq(zone),

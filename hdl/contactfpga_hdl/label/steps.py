@@ -198,6 +198,7 @@ class Walk(wiring.Component):
             m.d.comb += step.seam.eq(left.seam & left.first)
             with m.If(left.seam & ~left.ends.any() & (has_before | has_run)):
                 m.d.comb += closes.eq(0)
+        # What is left, without this step's runs, or without the cluster that ends
         edges_stop = _without_lowest(m, left.edges_later)
         with m.If(self.enable):
             m.d.sync += [self.step.eq(step), self.step_valid.eq(left.work | left.last & ~left.found), left.found.eq(0)]

@@ -49,24 +49,14 @@ class Reporter(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         report_due = Signal()
-        is_slot = Signal() if self._slot else Const(0)
+        is_slot = Signal(name="is_slot") if self._slot else Const(0)
+        # Digit: of the report under way, or the one to compare
         watch = Signal((len(self._report) - 1).bit_length())
         at = Signal.like(watch)
         m.d.sync += watch.eq(watch + 1)
         m.d.comb += at.eq(Mux(self.sends, self.place, watch))
         now = _select(m, at, self._report, _digits(self.word.as_value()))
-        with m.If(self._compare(m, at, is_slot) | self.greeted):
-            m.d.sync += report_due.eq(1)
-        with m.If(self.taken):
-            m.d.sync += report_due.eq(0)
-        m.d.comb += [self.due.eq(report_due), self.length.eq(len(self._report))]
-        if self._slot:
-            now = self._put_slots(m, is_slot, report_due, now)
-        with m.If(self.fetches | ~self.sends):
-            m.d.sync += self.byte.eq(now)
-        return m
-
-    def _compare(self, m: Module, at: Value, is_slot: Value) -> Value:
+        # Memory of the report that was sent: between reports, one digit after the other is compared with it
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
@@ -74,7 +64,19 @@ class Reporter(wiring.Component):
         watched = Signal()
         m.d.sync += [offers.eq(self.fetches & self.sends & ~is_slot), watched.eq(~self.sends)]
         m.d.comb += [read.addr.eq(at), write.en.eq(offers), write.addr.eq(at), write.data.eq(self.byte)]
-        return watched & ~self.sends & (read.data != self.byte)
+        differs = watched & ~self.sends & (read.data != self.byte)
+        # Report, when it differs and after a hello
+        with m.If(differs | self.greeted):
+            m.d.sync += report_due.eq(1)
+        with m.If(self.taken):
+            m.d.sync += report_due.eq(0)
+        m.d.comb += [self.due.eq(report_due), self.length.eq(len(self._report))]
+        if self._slot:
+            now = self._put_slots(m, is_slot, report_due, now)
+        # Byte
+        with m.If(self.fetches | ~self.sends):
+            m.d.sync += self.byte.eq(now)
+        return m
 
     def _put_slots(self, m: Module, is_slot: Value, report_due: Value, report: Value) -> Value:
         slot = self.slots.payload

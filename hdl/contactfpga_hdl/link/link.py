@@ -8,15 +8,15 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS
-from contactfpga.wire import numbered, protocol
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire import protocol, sheet_number
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
 from contactfpga_hdl.util.upset import upset_places
 
 if TYPE_CHECKING:
-    from contactfpga_hdl.link.between import Readings, Reports
+    from contactfpga_hdl.link.other_packets import Readings, Reports
 
 HELLO_REGION = 3
 
@@ -50,7 +50,7 @@ class Link(wiring.Component):
     Three regions of one memory rotate among the three frames; a fourth holds the hello. As its end mark is packed, a
     new frame drops and counts a waiting one, whose place it takes when complete. Nothing here blocks the stages before.
     The hello is fixed except for the digits of its state, each read in the clock before its byte is offered.
-    :mod:`contactfpga_hdl.link.between` has the order of packets.
+    :mod:`contactfpga_hdl.link.other_packets` has the order of packets.
 
     frames (in): see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -119,30 +119,7 @@ class Link(wiring.Component):
         m = Module()
         wire, regions = _Wire(self._offset_bits), _Regions(self._offset_bits)
         hello_due = Signal(init=1)
-        self._place_frames(m, wire, regions)
-        if not self.skin.dual:
-            m.d.comb += self.upset.eq(upset_places(regions.filling, regions.waiting, regions.sending))
-        frames_sent = self._decide(m, wire, regions)
-        with m.If(wire.take_hello):
-            m.d.sync += hello_due.eq(0)
-        with m.If(self._hello_period(m) | self.asked):
-            m.d.sync += hello_due.eq(1)
-        byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
-        others = self._others(m, wire)
-        for other in others:
-            byte = Mux(other.sent, other.byte, byte)
-        self._send(m, wire, regions, hello_due, byte, others)
-        return m
-
-    def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
-        if not self._optional_ports():
-            return []
-        from contactfpga_hdl.link.between import Readings, Reports
-
-        kinds = [Reports] * hasattr(self, "faults") + [Readings] * hasattr(self, "units")
-        return [kind(m, self, wire) for kind in kinds]
-
-    def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
+        # Regions rotate as a frame is taken, dropped or complete
         with m.If(wire.take_frame):
             m.d.sync += [
                 regions.waits.eq(0),
@@ -158,9 +135,9 @@ class Link(wiring.Component):
                 regions.waiting.eq(regions.filling),
                 regions.filling.eq(regions.waiting),
             ]
-
-    def _decide(self, m: Module, wire: _Wire, regions: _Regions) -> Value:
-        """Decide whether a frame is sent, and its numbers. Returns the count of sent frames in its low digits."""
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(upset_places(regions.filling, regions.waiting, regions.sending))
+        # Verdict on a frame whose end mark is packed
         verdict, decide = self.frames.verdict, self.frames.decide
         frames_sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
         overwritten = Signal(self.derived.overwritten_bits)
@@ -178,7 +155,26 @@ class Link(wiring.Component):
                 m.d.sync += fault_before.eq(self.tag.fault)
             changed = self.summary.changed | self.tag.fault ^ fault_before
             m.d.comb += verdict.send.eq(changed | self.tag.requested | self.due)
-        return frames_sent
+        # Hellos
+        with m.If(wire.take_hello):
+            m.d.sync += hello_due.eq(0)
+        with m.If(self._hello_period(m) | self.asked):
+            m.d.sync += hello_due.eq(1)
+        # Packets
+        byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
+        others = self._others(m, wire)
+        for other in others:
+            byte = Mux(other.sent, other.byte, byte)
+        self._send(m, wire, regions, hello_due, byte, others)
+        return m
+
+    def _others(self, m: Module, wire: _Wire) -> "list[Reports | Readings]":
+        if not self._optional_ports():
+            return []
+        from contactfpga_hdl.link.other_packets import Readings, Reports
+
+        kinds = [Reports] * hasattr(self, "faults") + [Readings] * hasattr(self, "units")
+        return [kind(m, self, wire) for kind in kinds]
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
         init = [0] * (HELLO_REGION << self._offset_bits) + list(self._hello)
@@ -265,7 +261,7 @@ class Link(wiring.Component):
 
     def _closing(self, crc: Value) -> list[Value]:
         """The sheet's number, if any, and the CRC in pieces of seven bits, so that no byte is zero."""
-        number = b"" if self.place is None else numbered.closing(self.place.number)
+        number = b"" if self.place is None else sheet_number.closing(self.place.number)
         return [
             *(Const(byte, 8) for byte in number),
             *(Cat(crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)),

@@ -41,12 +41,14 @@ class Odometer(wiring.Component):
         sent_waits = Signal()
         epoch_waits = Signal()
         at = Signal.like(self.place)
+        # Digit at the hello's place
         m.d.comb += [
             self.digit.eq(read.data),
             read.addr.eq(self.place),
             write.addr.eq(at),
             write.data.eq(read.data + 1),
         ]
+        # Carry
         with m.FSM(name="carry", init="CLEAR"):
             with m.State("REST"):
                 with m.If((sent_waits | epoch_waits) & ~self.hold):
@@ -67,6 +69,7 @@ class Odometer(wiring.Component):
                 m.d.sync += at.eq(at + 1)
                 with m.If(at == STATE_DIGITS - 1):
                     m.next = "REST"
+        # Carries that wait
         with m.If(self.sent):
             m.d.sync += sent_waits.eq(1)
         with m.If(self.epoch):

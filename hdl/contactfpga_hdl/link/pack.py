@@ -83,11 +83,7 @@ class Packer(wiring.Component):
         m = Module()
         plain = stream.Signature(8).create()  # the frame's bytes before they are stuffed
         restart = Signal()  # the next of them is a frame's first one
-        self._sequence_bytes(m, plain, restart)
-        self._stuff(m, plain, restart)
-        return m
-
-    def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
+        # Bytes of items, then of the trailer
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))
@@ -121,26 +117,7 @@ class Packer(wiring.Component):
         from_trailer = part.ongoing("TRAILER") | ends
         with m.If(free):
             m.d.sync += plain.payload.eq(Mux(from_trailer, trailer.word_select(index, 8), item.word_select(index, 8)))
-
-    def _trailer(self, m: Module) -> Value:
-        trailer = Signal(_trailer_layout(self.derived))
-        m.d.comb += [
-            trailer.time.eq(self.tag.time),
-            trailer.sequence.eq(self.frames.verdict.sequence),
-            trailer.overwritten.eq(self.frames.verdict.overwritten),
-            trailer.overflow.eq(self.summary.overflow),
-            trailer.mismatch.eq(self.summary.mismatch),
-            trailer.fault.eq(self.tag.fault),
-            trailer.motion.eq(self.tag.motion if self.skin.reads_rows else 0),
-            trailer.heard.eq(self.tag.heard),
-            trailer.cells.eq(self.summary.cells),
-            trailer.zones.eq(self.summary.zones),
-            trailer.kind.eq(protocol.KINDS[self.skin.report]),
-        ]
-        return trailer.as_value()
-
-    def _stuff(self, m: Module, plain: stream.Interface, restart: Value) -> None:
-        """COBS: ``code`` is the place of the open block's length, ``length`` its value so far."""
+        # COBS: ``code`` is the place of the open block's length, ``length`` its value so far
         write, commit = self.frames.write, self.frames.commit
         code = Signal.like(write.offset)
         place = Signal.like(write.offset, init=1)
@@ -164,3 +141,21 @@ class Packer(wiring.Component):
                 m.d.sync += [code.eq(place), length.eq(1), full.eq(0)]
             with m.Else():
                 m.d.sync += [length.eq(length + 1), full.eq(length == FULL_BLOCK - 1)]
+        return m
+
+    def _trailer(self, m: Module) -> Value:
+        trailer = Signal(_trailer_layout(self.derived))
+        m.d.comb += [
+            trailer.time.eq(self.tag.time),
+            trailer.sequence.eq(self.frames.verdict.sequence),
+            trailer.overwritten.eq(self.frames.verdict.overwritten),
+            trailer.overflow.eq(self.summary.overflow),
+            trailer.mismatch.eq(self.summary.mismatch),
+            trailer.fault.eq(self.tag.fault),
+            trailer.motion.eq(self.tag.motion if self.skin.reads_rows else 0),
+            trailer.heard.eq(self.tag.heard),
+            trailer.cells.eq(self.summary.cells),
+            trailer.zones.eq(self.summary.zones),
+            trailer.kind.eq(protocol.KINDS[self.skin.report]),
+        ]
+        return trailer.as_value()

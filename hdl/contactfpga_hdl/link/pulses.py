@@ -35,6 +35,7 @@ class PulseReceiver(wiring.Component):
         ends = Signal()
         mark = Signal()
         whole = Signal()  # since a clock ago
+        # Pulse: a bit, by its length, or a mark
         m.d.comb += [
             ends.eq(level & (low != 0)),
             mark.eq((low > longest_one) & (low <= longest_mark)),
@@ -43,6 +44,7 @@ class PulseReceiver(wiring.Component):
             self.bits.good.eq(whole | ends & mark & (index == 0)),
             self.bits.bad.eq(ends & mark & (index != 0)),
         ]
+        # Length of the pulse, and place in the byte
         with m.If(level):
             m.d.sync += low.eq(0)
         with m.Elif(low <= longest_mark):

@@ -65,41 +65,44 @@ class Records(wiring.Component):
         m = Module()
         place = Signal(range(self.derived.max_items + 1))  # of the next word to be written
         end = Signal.like(place)  # the last word of the frame that waits
-        waits = Signal()  # a whole frame does
-        owed = Signal()  # one was replaced, so the next one is kept
-        half = Signal()  # that is read
-        reads = Signal()  # words of it are left
-        hands = waits & ~reads  # the halves change places
-        owes = owed | waits & ~hands
-        keeps = self.item.end & (self.send | owes)
+        frame_waits = Signal()
+        must_keep = Signal()  # a frame was replaced
+        read_half = Signal()  # number of the half that is read
+        reading = Signal()  # words of it are left
+        swaps = frame_waits & ~reading  # the halves change places
+        replaced = must_keep | frame_waits & ~swaps
+        keeps = self.item.end & (self.send | replaced)
+        # Half that is filled
         m.submodules.store = store = memory.Memory(shape=word_bits(self.derived), depth=2 << len(place), init=[])
         write = store.write_port()
         m.d.comb += [
             write.en.eq(self.taken),
-            write.addr.eq(Cat(place, ~half ^ hands)),
+            write.addr.eq(Cat(place, ~read_half ^ swaps)),
             write.data.eq(Mux(self.item.end, self._closing(m, self.taken & keeps), self.item.data)),
         ]
-        self._read(m, store.read_port(), half, reads, hands, end)
-        with m.If(hands):
-            m.d.sync += [waits.eq(0), half.eq(~half)]
+        # Half that is read
+        self._read(m, store.read_port(), read_half, reading, swaps, end)
+        with m.If(swaps):
+            m.d.sync += [frame_waits.eq(0), read_half.eq(~read_half)]
+        # Frame that waits
         with m.If(self.taken):
             m.d.sync += [
                 place.eq(Mux(self.item.end, 0, place + 1)),
                 end.eq(place),
-                waits.eq(keeps),
-                owed.eq(owes & ~self.item.end),
+                frame_waits.eq(keeps),
+                must_keep.eq(replaced & ~self.item.end),
             ]
         with m.If(self.restart):
             m.d.sync += place.eq(0)
         return m
 
-    def _read(self, m: Module, read: memory.ReadPort, half: Value, reads: Signal, hands: Value, end: Value) -> None:
+    def _read(self, m: Module, read: memory.ReadPort, half: Value, reading: Signal, swaps: Value, end: Value) -> None:
         words = self.words
         place, last = Signal.like(end), Signal.like(end)
         closes = Signal()  # the word that is offered
         fetches = Signal()
         m.d.comb += [
-            fetches.eq(reads & (~words.valid | words.ready)),
+            fetches.eq(reading & (~words.valid | words.ready)),
             read.en.eq(fetches),
             read.addr.eq(Cat(place, half)),
             words.payload.data.eq(read.data),
@@ -107,9 +110,9 @@ class Records(wiring.Component):
         ]
         m.d.sync += words.valid.eq(fetches | words.valid & ~words.ready)
         with m.If(fetches):
-            m.d.sync += [place.eq(place + 1), closes.eq(place == last), reads.eq(place != last)]
-        with m.If(hands):
-            m.d.sync += [place.eq(0), last.eq(end), reads.eq(1)]
+            m.d.sync += [place.eq(place + 1), closes.eq(place == last), reading.eq(place != last)]
+        with m.If(swaps):
+            m.d.sync += [place.eq(0), last.eq(end), reading.eq(1)]
 
     def _closing(self, m: Module, kept: Value) -> Value:
         number = Signal(NUMBER_BITS)

@@ -7,7 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import CHECK_BYTES, HEARD_BITS
-from contactfpga.wire import numbered, protocol
+from contactfpga.wire import protocol, sheet_number
 from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
@@ -32,7 +32,7 @@ class RequestReader(wiring.Component):
 
     def __init__(self, commands: bool = False, sheet: int | None = None):
         self.commands = commands
-        self._closing = b"" if sheet is None else numbered.closing(sheet)
+        self._closing = b"" if sheet is None else sheet_number.closing(sheet)
         self._kind = _WHAT + _ARGUMENTS * commands  # the last byte's place
         self._first_check = self._kind + len(self._closing) + 1
         self._whole = self._first_check + CHECK_BYTES  # bytes up to the delimiter
@@ -55,7 +55,12 @@ class RequestReader(wiring.Component):
         place = Signal(range(beyond + 1), init=beyond)  # bytes since the last delimiter; stays after the last
         bit = self.bits.index
         zero = Signal(init=1)  # all bits of this byte so far
-        is_command = self._read_code(m, place, bit)
+        # Command or request, by its length
+        is_command = Signal(name="is_command") if self.commands else Const(0, 1)
+        if self.commands:
+            with m.If(self.bits.bit & (place == 0) & (bit == _LONG_BIT)):
+                m.d.sync += is_command.eq(self.bits.level)
+        # Place in the packet; a request has no arguments
         with m.If(self.bits.bit):
             m.d.sync += zero.eq(zero & ~self.bits.level)
         with m.If(self.bits.good | self.bits.bad):
@@ -66,32 +71,10 @@ class RequestReader(wiring.Component):
                 m.d.sync += place.eq(beyond)
             with m.Else():
                 m.d.sync += place.eq(place + 1)
-                self._leave_out_arguments(m, place, is_command)
-        checked = self._check(m, place, bit, restart=self.bits.good & zero)
-        kind_fits = self._read_kind(m, place, bit, is_command)
-        m.d.comb += self.received.eq(self.bits.good & zero & (place == self._whole) & checked & kind_fits)
-        self._keep_number(m, place, bit)
-        if self.commands:
-            m.d.comb += self.command.eq(self.received & is_command)
-            self._keep(m, self.what, _WHAT, _VALUE, place, bit)
-            self._keep(m, self.value, _VALUE, self._kind, place, bit)
-        return m
-
-    def _read_code(self, m: Module, place: Value, bit: Value) -> Value:
-        if not self.commands:
-            return Const(0, 1)
-        is_command = Signal()
-        with m.If(self.bits.bit & (place == 0) & (bit == _LONG_BIT)):
-            m.d.sync += is_command.eq(self.bits.level)
-        return is_command
-
-    def _leave_out_arguments(self, m: Module, place: Value, is_command: Value) -> None:
-        if self.commands:
-            with m.If((place == _WHAT - 1) & ~is_command):
-                m.d.sync += place.eq(self._kind)
-
-    def _check(self, m: Module, place: Value, bit: Value, restart: Value) -> Value:
-        """CRC-16/MCRF4XX over everything before the check bytes, then over their own bits, which leaves all zeros."""
+                if self.commands:
+                    with m.If((place == _WHAT - 1) & ~is_command):
+                        m.d.sync += place.eq(self._kind)
+        # CRC-16/MCRF4XX over everything before the check bytes, then over their own bits, which leaves all zeros
         crc = Signal(16, init=0xFFFF)
         first = self._first_check
         own = (place == first) | (place == first + 1)
@@ -100,11 +83,10 @@ class RequestReader(wiring.Component):
         feedback = crc[0] ^ self.bits.level
         with m.If(self.bits.bit & counts):
             m.d.sync += crc.eq((crc >> 1) ^ (feedback.replicate(16) & 0x8408))
-        with m.If(restart):
+        with m.If(self.bits.good & zero):
             m.d.sync += crc.eq(0xFFFF)
-        return crc == 0
-
-    def _read_kind(self, m: Module, place: Value, bit: Value, is_command: Value) -> Value:
+        checked = crc == 0
+        # Kind and sheet
         fits = Signal()
         wanted = Const(protocol.last_byte(protocol.KIND_REQUEST), 8).bit_select(bit, 1)
         if self.commands:
@@ -117,7 +99,14 @@ class RequestReader(wiring.Component):
         for at, byte in enumerate(self._closing, self._kind + 1):
             with m.If(self.bits.bit & (place == at)):
                 m.d.sync += fits.eq(fits & (self.bits.level == Const(byte, 8).bit_select(bit, 1)))
-        return fits
+        # Results
+        m.d.comb += self.received.eq(self.bits.good & zero & (place == self._whole) & checked & fits)
+        self._keep_number(m, place, bit)
+        if self.commands:
+            m.d.comb += self.command.eq(self.received & is_command)
+            self._keep(m, self.what, _WHAT, _VALUE, place, bit)
+            self._keep(m, self.value, _VALUE, self._kind, place, bit)
+        return m
 
     def _keep_number(self, m: Module, place: Value, bit: Value) -> None:
         number = Signal.like(self.number)

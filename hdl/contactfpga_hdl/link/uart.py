@@ -67,6 +67,7 @@ class Receiver(wiring.Component):
         half = self.bit_clocks // 2
         clock = Signal(range(self.bit_clocks))
         bits_left = Signal(range(11))  # counting the start bit; 0: waiting for one
+        # Bits, sampled in their middle
         with m.If(bits_left == 0):
             with m.If(~level):
                 m.d.sync += [bits_left.eq(10), clock.eq(half - 1)]

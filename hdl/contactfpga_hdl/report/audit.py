@@ -57,6 +57,7 @@ class Audit(wiring.Component):
         overflow = Signal()
         fits = zones < self.derived.zone_capacity
         passes = record.end | fits
+        # Zones up to the frame's capacity
         m.submodules.counts = counts = Counts(self.skin)
         m.d.comb += [
             self.records.ready.eq(self.items.ready | ~passes),
@@ -70,6 +71,7 @@ class Audit(wiring.Component):
             counts.zone_valid.eq(zone),
             counts.zone.eq(record.zone),
         ]
+        # Summary
         with m.If(zone):
             m.d.sync += [zones.eq(zones + 1), overflow.eq(overflow | ~fits)]
         with m.If(ends):
@@ -123,6 +125,7 @@ class Tally(wiring.Component):
         area = Signal(range(self._columns + 1))
         offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
         first_counted = Signal.like(first)
+        # Groups of a row, one per clock
         number = row_number(m, self.derived, self.row, self.taken)
         with m.If(self.taken & self.row.cells.any()):
             m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(number)]
@@ -135,6 +138,7 @@ class Tally(wiring.Component):
                 offsets.eq(_count_offsets(group)),
                 first_counted.eq(first),
             ]
+        # Moments of the group before
         m.d.comb += [
             self.busy.eq(left != 0),
             self.moments.area.eq(area),
@@ -184,15 +188,7 @@ class Counts(wiring.Component):
             tally.row.eq(self.row),
             self.free.eq(~tally.busy | ~self.row.cells.any()),
         ]
-        self._explain(m, tally)
-        if self.skin.send == "on_change":
-            self._watch_change(m)
-        else:
-            m.d.comb += self.changed.eq(1)
-        return m
-
-    def _explain(self, m: Module, tally: Tally) -> None:
-        """Add counted cells; a clock after zones pass, subtract them, which pauses the counting."""
+        # Cells without a zone: counted ones are added; zones are subtracted a clock after they pass, which pauses that
         cells = Signal.like(self.cells)
         unexplained = Signal(moments_layout(self.derived))
         passed, zone = Signal(), Signal.like(self.zone)
@@ -214,6 +210,12 @@ class Counts(wiring.Component):
                 cells.eq(0),
                 unexplained.eq(0),
             ]
+        # Change
+        if self.skin.send == "on_change":
+            self._watch_change(m)
+        else:
+            m.d.comb += self.changed.eq(1)
+        return m
 
     def _watch_change(self, m: Module) -> None:
         from contactfpga_hdl.report.change import Change

@@ -25,6 +25,7 @@ class Change(wiring.Component):
         skips = self.derived.skips
         row = self.row
         word = Cat(row.cells, row.y) if skips else row.cells
+        # Memory of the frame before
         m.submodules.before = before = memory.Memory(shape=len(word), depth=self.skin.rows, init=[])
         read, write = before.read_port(), before.write_port()
         place = Signal(range(self.skin.rows + skips))  # where the next row that counts belongs
@@ -37,6 +38,7 @@ class Change(wiring.Component):
             write.data.eq(word),
             write.en.eq(counts),
         ]
+        # Comparison, with skipped rows also of how many there are
         differs = counts & (read.data != word)
         if skips:
             number_before = Signal.like(place)

@@ -59,8 +59,10 @@ class Divider(wiring.Component):
         free = ~waits | self.items.ready
         last = left == 1
         steps = (left != 0) & (~last | free)
+        # Division of both sums
         for name in ("x", "y"):
             m.d.comb += found[name].eq(self._divide(m, name, zone[f"sum_{name}"], zone.area, begins, steps))
+        # Steps, and the item that waits
         with m.If(begins):
             m.d.sync += left.eq(bits)
         with m.If(steps):
@@ -69,6 +71,7 @@ class Divider(wiring.Component):
             m.d.sync += waits.eq(last)
         with m.If(last & free):
             m.d.sync += [area.eq(zone.area), waiting.eq(found)]
+        # Streams
         m.d.comb += [
             self.records.ready.eq(Mux(end, ~waits & self.items.ready, last & free)),
             self.items.valid.eq(waits | self.records.valid & end),

@@ -49,6 +49,7 @@ class FrameClock(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         time = self.time
+        # Time in us
         prescaler = Signal(range(max(2, self._per_us)), init=self.ahead % self._per_us)
         ticks = Signal()
         m.d.comb += ticks.eq(self.runs & (prescaler == self._per_us - 1))
@@ -57,6 +58,7 @@ class FrameClock(wiring.Component):
         if not self.skin.dual:
             m.d.comb += self.upset.eq(upset_count(m, "time", time, ticks))
         watch_epoch(m, time, self.epoch, late=self.ahead < 0)
+        # Values as the frame begins
         with m.If(self.frame_begins):
             m.d.sync += [
                 self.begun.eq(time),

@@ -49,6 +49,7 @@ class LineFaults(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin, faults = self.skin, self.faults
+        # Rounds that renew
         before, toggled, renewing = Signal(), Signal(), Signal()
         toggles = self.retry ^ before
         m.d.sync += before.eq(self.retry)
@@ -56,6 +57,7 @@ class LineFaults(wiring.Component):
             m.d.sync += [renewing.eq(toggled | toggles), toggled.eq(0)]
         with m.Elif(toggles):
             m.d.sync += toggled.eq(1)
+        # Reported lines
         kept = ~Mux(renewing, self.checks_rows, 0)
         found = self.rows & self.checks_rows & checked_rows(skin)
         m.d.sync += faults.rows.eq(faults.rows & kept | found)

@@ -61,6 +61,7 @@ class Precharge(wiring.Component):
         toggles = Signal()
         free = Signal(self.skin.column_lines)
         lines = watched(self.skin)
+        # Columns that may be driven, and the pins
         m.d.comb += [
             toggles.eq(self.retry ^ before),
             ends.eq(self.looks & count.all()),
@@ -73,11 +74,13 @@ class Precharge(wiring.Component):
             asked.eq(toggles | asked & ~ends),
             count.eq(count + (self.looks | ~count[: self.apart_bits].all())),
         ]
+        # Columns that read pressed throughout a window
         with m.If(ends):
             kept = stuck & ~tries.replicate(len(stuck))
             m.d.sync += [low.eq(-1), tries.eq(asked), stuck.eq((low & self.columns | kept) & lines)]
         with m.Elif(self.looks):
             m.d.sync += low.eq(low & self.columns)
+        # Guard column
         if self.alone:
             guard_stuck = Signal()
             m.d.sync += guard_stuck.eq(~toggles & (guard_stuck | self.guard_pressed))

@@ -71,23 +71,62 @@ class Scanner(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin = self.skin
+        # Drivers and readers of lines
         m.submodules.driver = driver = self._row_driver()
         m.submodules.reader = reader = self._column_reader()
         m.submodules.stuck = stuck = Stuck(skin)
         connect_pins(m, driver.pins, self.pins)
         connect_pins(m, reader.pins, self.pins)
         slots, sample = _Slots(self.derived), _Sample(self.derived)
-        self._drive_rows(m, slots, driver)
+        # Slots
+        slot, shifting = self.derived.row_clocks, self.derived.row_shift_clocks
+        ends = slots.clock == slot - 1
+        m.d.sync += slots.clock.eq(slots.clock + 1)
+        with m.If(ends):
+            # One row only follows, whatever was there.
+            before = slots.following[:-1]
+            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(Cat(~before.any(), before))]
+        m.d.comb += [
+            driver.pattern.eq(slots.following),
+            driver.shift.eq(slots.clock == slot - shifting),
+            driver.drive.eq(ends),
+            driver.release.eq(slots.clock == self.derived.settle_clocks - 1),
+        ]
+        # Sample, without masked switches
         levels = self._sample_columns(m, slots, reader, sample)
-        self._mask_row(m, levels, sample)
-        self._offer_row(m, sample)
-        self._watch_contact(m, sample)
+        m.d.comb += [
+            sample.read.eq(~levels if skin.selects_low else levels),
+            sample.pressed.eq(sample.read),
+        ]
+        with m.Switch(sample.row):
+            for row in sorted({row for row, _ in skin.mask}):
+                with m.Case(row):
+                    m.d.comb += sample.pressed.eq(sample.read & present(skin, row))
+        # Rows
+        with m.If(sample.of_row):
+            m.d.sync += [
+                self.rows.valid.eq(1),
+                self.rows.payload.cells.eq(sample.pressed),
+                self.rows.payload.last.eq(sample.is_last),
+            ]
+        with m.Elif(self.rows.ready):
+            m.d.sync += self.rows.valid.eq(0)
+        # Contact
+        seen = Signal()  # in this scan's rows so far
+        with m.If(sample.of_row):
+            now = sample.pressed.any()
+            m.d.sync += [
+                seen.eq(~sample.is_last & (seen | now)),
+                self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
+            ]
+        # Tag
         clock = self._tag_frame(m, slots, sample)
         if skin.precharge_us:
             self._precharge(m, slots, sample, clock.time)
         if not skin.dual:
             found = upset(m, "row", slots.following, driver.drive)
             m.d.comb += self.upset.eq(driver.upset | found | clock.upset)
+        # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
@@ -112,22 +151,6 @@ class Scanner(wiring.Component):
         from contactfpga_hdl.scan.shift import ColumnChain
 
         return ColumnChain(self.skin)
-
-    def _drive_rows(self, m: Module, slots: _Slots, driver: wiring.Component) -> None:
-        derived = self.derived
-        slot, shifting = derived.row_clocks, derived.row_shift_clocks
-        ends = slots.clock == slot - 1
-        m.d.sync += slots.clock.eq(slots.clock + 1)
-        with m.If(ends):
-            # Of one row only, whatever it was.
-            before = slots.following[:-1]
-            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(Cat(~before.any(), before))]
-        m.d.comb += [
-            driver.pattern.eq(slots.following),
-            driver.shift.eq(slots.clock == slot - shifting),
-            driver.drive.eq(ends),
-            driver.release.eq(slots.clock == derived.settle_clocks - 1),
-        ]
 
     def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
         """Sample in the last clock of a row, and in the last clock without a row; returns the sampled levels."""
@@ -194,53 +217,24 @@ class Scanner(wiring.Component):
         from contactfpga_hdl.scan.guard import LineFaults
 
         skin = self.skin
-        m.submodules.told = told = LineFaults(skin)
+        m.submodules.line_faults = line_faults = LineFaults(skin)
         ended = Signal()
         at_end = Signal()
         m.d.comb += [
-            told.rows.eq((~sample.read[-1]).replicate(skin.rows)),
-            told.columns.eq(~sample.read),
-            told.stuck.eq(stuck.seen),
-            told.checks_rows.eq(Mux(sample.of_row & ~sample.early, Const(1, skin.rows) << sample.row, 0)),
-            told.checks_columns.eq(sample.of_driven & sample.is_guard),
-            told.checks_stuck.eq(stuck.take),
-            told.round.eq(stuck.take),
-            told.retry.eq(time[RETRY_BIT]),
-            self.faults.eq(told.faults),
+            line_faults.rows.eq((~sample.read[-1]).replicate(skin.rows)),
+            line_faults.columns.eq(~sample.read),
+            line_faults.stuck.eq(stuck.seen),
+            line_faults.checks_rows.eq(Mux(sample.of_row & ~sample.early, Const(1, skin.rows) << sample.row, 0)),
+            line_faults.checks_columns.eq(sample.of_driven & sample.is_guard),
+            line_faults.checks_stuck.eq(stuck.take),
+            line_faults.round.eq(stuck.take),
+            line_faults.retry.eq(time[RETRY_BIT]),
+            self.faults.eq(line_faults.faults),
         ]
         m.d.sync += ended.eq(stuck.take)
         with m.If(ended):
-            m.d.sync += at_end.eq(told.faults.as_value().any())
+            m.d.sync += at_end.eq(line_faults.faults.as_value().any())
         return at_end
-
-    def _mask_row(self, m: Module, levels: Value, sample: _Sample) -> None:
-        m.d.comb += [
-            sample.read.eq(~levels if self.skin.selects_low else levels),
-            sample.pressed.eq(sample.read),
-        ]
-        with m.Switch(sample.row):
-            for row in sorted({row for row, _ in self.skin.mask}):
-                with m.Case(row):
-                    m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
-
-    def _offer_row(self, m: Module, sample: _Sample) -> None:
-        with m.If(sample.of_row):
-            m.d.sync += [
-                self.rows.valid.eq(1),
-                self.rows.payload.cells.eq(sample.pressed),
-                self.rows.payload.last.eq(sample.is_last),
-            ]
-        with m.Elif(self.rows.ready):
-            m.d.sync += self.rows.valid.eq(0)
-
-    def _watch_contact(self, m: Module, sample: _Sample) -> None:
-        seen = Signal()  # in this scan's rows so far
-        with m.If(sample.of_row):
-            now = sample.pressed.any()
-            m.d.sync += [
-                seen.eq(~sample.is_last & (seen | now)),
-                self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
-            ]
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:
         """The frame clock; the tag takes its values with the last row's strobe."""

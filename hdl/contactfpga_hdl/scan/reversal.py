@@ -70,7 +70,18 @@ class ReversalScanner(wiring.Component):
         m.submodules.frame_clock = clock = FrameClock(skin)
         m.submodules.precharge = precharge = Precharge(skin)
         read, pressed = Signal(skin.rows), Signal(skin.column_lines)  # rows that read touched, columns pressed
-        rows = self._read_sheet(m, pressed)
+        # Lines at the pins, through synchronizers
+        rows = Signal(skin.rows)
+        at_pins = self.pins.rows_read[: skin.rows]
+        m.submodules.rows = FFSynchronizer(at_pins, rows, init=0 if skin.selects_low else -1)
+        m.submodules.reader = reader = DirectColumns(skin)
+        m.d.comb += [
+            reader.pins.columns.eq(self.pins.columns),
+            pressed.eq(~reader.levels if skin.selects_low else reader.levels),
+        ]
+        if not skin.selects_low:
+            rows = ~rows
+        # Cycle
         m.d.comb += [
             read.eq(rows & sum(1 << row for row in range(skin.rows) if present(skin, row))),
             cycle.touched.eq(read | (self.busy if self.derived.debounced else 0)),
@@ -80,10 +91,29 @@ class ReversalScanner(wiring.Component):
         ]
         if moves_sample(self.derived):
             m.d.comb += [cycle.moves.eq(self.moves), cycle.clocks.eq(self.clocks)]
+        # Rows and tag
         self._hand_on(m, cycle, (rows & clean_rows(skin)).any(), read, pressed)
         toggles = self._tag_frame(m, cycle, clock)
         test = SelfTest(skin) if skin.self_test else None
-        self._drive_sheet(m, cycle, precharge, pressed, test)
+        # Pins
+        begun = Signal()
+        m.d.sync += begun.eq(cycle.begins)
+        selected = Cat(cycle.selected, cycle.guard)[: skin.row_lines]
+        if drives_columns_both_ways(skin):
+            inverted = Signal()
+            m.d.sync += inverted.eq(cycle.inverts | (0 if test is None else test.discharges))
+            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
+        m.d.comb += [
+            self.pins.rows.eq(~selected if skin.selects_low else selected),
+            self.pins.columns_drive.eq(precharge.pins),
+            precharge.drive.eq(cycle.charges),
+            precharge.columns.eq(pressed),
+            precharge.looks.eq(cycle.begins | cycle.rests & cycle.settled),
+            precharge.retry.eq(self.time[RETRY_BIT]),
+        ]
+        self._let_go(m, cycle, precharge, test)
+        count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
+        # Checks of lines
         if skin.guard:
             self._check_lines(m, cycle, precharge, toggles, read, pressed)
         else:
@@ -96,24 +126,12 @@ class ReversalScanner(wiring.Component):
         """Whether any fault is known now, but not in the last frame's flag, or the other way round. It is late by a
         clock, which is less than the least distance of two frames."""
         changed = Signal()
-        m.d.sync += changed.eq((self.stuck | self._told) ^ self.tag.fault)
+        m.d.sync += changed.eq((self.stuck | self._any_fault) ^ self.tag.fault)
         return changed
 
     @property
-    def _told(self) -> Value:
+    def _any_fault(self) -> Value:
         return self.faults.as_value().any() if "faults" in self.signature.members else Const(0)
-
-    def _read_sheet(self, m: Module, pressed: Signal) -> Value:
-        skin = self.skin
-        rows = Signal(skin.rows)
-        at_pins = self.pins.rows_read[: skin.rows]
-        m.submodules.rows = FFSynchronizer(at_pins, rows, init=0 if skin.selects_low else -1)
-        m.submodules.reader = reader = DirectColumns(skin)
-        m.d.comb += [
-            reader.pins.columns.eq(self.pins.columns),
-            pressed.eq(~reader.levels if skin.selects_low else reader.levels),
-        ]
-        return rows if skin.selects_low else ~rows
 
     def _hand_on(self, m: Module, cycle: ReversalCycle, wakes: Value, read: Value, pressed: Value) -> None:
         skin = self.skin
@@ -181,31 +199,9 @@ class ReversalScanner(wiring.Component):
         if "faults" in self.signature.members:
             m.d.sync += counted.eq(Cat(cycle.begins, counted))
             with m.If(counted[1]):
-                m.d.sync += at_begin.eq(self._told)
+                m.d.sync += at_begin.eq(self._any_fault)
         m.d.comb += self.tag.fault.eq(self.tag.stuck.any() | at_begin)
         return toggles
-
-    def _drive_sheet(
-        self, m: Module, cycle: ReversalCycle, precharge: Precharge, pressed: Value, test: SelfTest | None
-    ) -> None:
-        skin = self.skin
-        begun = Signal()
-        m.d.sync += begun.eq(cycle.begins)
-        selected = Cat(cycle.selected, cycle.guard)[: skin.row_lines]
-        if drives_columns_both_ways(skin):
-            inverted = Signal()
-            m.d.sync += inverted.eq(cycle.inverts | (0 if test is None else test.discharges))
-            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
-        m.d.comb += [
-            self.pins.rows.eq(~selected if skin.selects_low else selected),
-            self.pins.columns_drive.eq(precharge.pins),
-            precharge.drive.eq(cycle.charges),
-            precharge.columns.eq(pressed),
-            precharge.looks.eq(cycle.begins | cycle.rests & cycle.settled),
-            precharge.retry.eq(self.time[RETRY_BIT]),
-        ]
-        self._let_go(m, cycle, precharge, test)
-        count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
 
     def _let_go(self, m: Module, cycle: ReversalCycle, precharge: Precharge, test: SelfTest | None) -> None:
         """Drive all rows or none, and the guard row; a self-test drives single lines."""

@@ -82,6 +82,7 @@ class ReversalCycle(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         waits = Signal()  # a row is on its way, or on offer
+        # Rows to be driven, samples on their way, and the clock of the state
         m.d.comb += [
             self.following.eq(lowest(self.todo)[: len(self.y)]),
             self.strobe.eq(self._due[-1]),
@@ -97,6 +98,7 @@ class ReversalCycle(wiring.Component):
             self.selected.eq(0),
             self.guard.eq(0),
         ]
+        # States; LISTEN also begins frames
         sample_clock = self._sample_clock(m)
         with m.FSM(name="cycle"):
             with m.State("LISTEN"):
@@ -118,6 +120,7 @@ class ReversalCycle(wiring.Component):
                 self._answer(m)
             if self.skin.self_test:
                 self._test(m)
+        # Discharge before a slot of the self-test
         if self.skin.self_test:
             with m.If(self.discharges):
                 m.d.sync += [self.selected.eq(-1), self.guard.eq(1)]

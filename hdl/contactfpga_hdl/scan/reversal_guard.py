@@ -46,21 +46,25 @@ class Checks(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin, guard_reads = self.skin, self.columns[-1]
-        m.submodules.told = told = LineFaults(skin)
+        m.submodules.line_faults = line_faults = LineFaults(skin)
+        # Turns
         m.d.sync += [
             self.of_rows.eq(self.of_rows ^ self.starts),
             self.asked.eq((self.asked | self.due) & ~self.starts),
         ]
+        # Results
         m.d.comb += [
             self.of_guard.eq(self.checked & ~self.of_rows),
-            told.rows.eq(~self.rows),
-            told.checks_rows.eq((self.of_guard & ~guard_reads & ~told.faults.stuck[-1]).replicate(skin.rows)),
-            told.columns.eq(~self.columns),
-            told.checks_columns.eq(self.checked & self.of_rows),
-            told.stuck.eq(self.held | Cat(Const(0, skin.columns), guard_reads)),
-            told.checks_stuck.eq(self.of_guard),
-            told.round.eq(self.of_guard),
-            told.retry.eq(self.retry),
-            self.faults.eq(told.faults),
+            line_faults.rows.eq(~self.rows),
+            line_faults.checks_rows.eq(
+                (self.of_guard & ~guard_reads & ~line_faults.faults.stuck[-1]).replicate(skin.rows)
+            ),
+            line_faults.columns.eq(~self.columns),
+            line_faults.checks_columns.eq(self.checked & self.of_rows),
+            line_faults.stuck.eq(self.held | Cat(Const(0, skin.columns), guard_reads)),
+            line_faults.checks_stuck.eq(self.of_guard),
+            line_faults.round.eq(self.of_guard),
+            line_faults.retry.eq(self.retry),
+            self.faults.eq(line_faults.faults),
         ]
         return m

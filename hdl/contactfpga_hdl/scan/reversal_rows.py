@@ -43,6 +43,7 @@ class DrivenRows(wiring.Component):
         rows, row = self.rows, self.rows.payload
         below, follows = Signal(), Signal()  # an empty row is on offer, or comes next
         m.d.comb += [row.y.eq(self.y + below), self.alone.eq(~below)]
+        # Row on offer
         with m.If(rows.valid & rows.ready):
             m.d.sync += [rows.valid.eq(follows), below.eq(follows), follows.eq(0), row.cells.eq(0)]
         with m.If(self.strobe):
@@ -73,6 +74,7 @@ class AllRows(wiring.Component):
             row.cells.eq(Mux(self.alone, cells, 0)),
             row.last.eq(place == self.skin.rows - 1),
         ]
+        # Rows in order
         with m.If(rows.valid & rows.ready):
             m.d.sync += place.eq(Mux(row.last, 0, place + 1))
             with m.If(self.alone):

@@ -61,9 +61,45 @@ class SelfTest(wiring.Component):
         number = Signal(range(lines + 2))  # of the slot; beyond the last there is none
         line = Signal(lines)  # that it drives
         m.d.comb += [line.eq((Const(1, 1) << number)[1 : lines + 1]), self.slots.payload.number.eq(number)]
+        # Levels of a slot
         judges = self._drive(m, line)
-        self._count(m, judges, number, lines)
-        self._judge(m, judges, number, line)
+        # Slots: one after another, and for a command also sent
+        waits = self.slots.valid
+        wanted = Signal()
+        tells = Signal()  # slots go out
+        over = Signal()
+        starts = Signal()
+        m.d.comb += [
+            over.eq(Mux(tells, waits & self.slots.ready, judges)),
+            starts.eq(wanted & (over | ~self.asks & ~waits)),
+        ]
+        with m.If(over):
+            m.d.sync += [waits.eq(0), self.asks.eq(number != lines), number.eq(number + 1)]
+        with m.If(judges & tells):
+            m.d.sync += [waits.eq(1), self.asks.eq(0)]
+        with m.If(starts):
+            m.d.sync += [wanted.eq(0), tells.eq(1), self.asks.eq(1), number.eq(0)]
+        with m.If(self.command):
+            m.d.sync += wanted.eq(1)
+        # Verdict: no other line may follow the driven one
+        rows, columns = self.rows, self.columns & anywhere(self.skin)
+        rises = Signal(len(line))  # in slot 0
+        first, found, follows, bad = Signal(), Signal(), Signal(len(line)), Signal()
+        of_row = line[: self.skin.rows].any()
+        m.d.comb += [
+            first.eq(number == 0),
+            follows.eq(Cat(Mux(of_row, rows, 0), columns) & ~line & ~rises),
+            bad.eq(Mux(first, rows.any() & ~columns.any(), follows.any())),
+        ]
+        with m.If(judges):
+            m.d.sync += [
+                self.slots.payload.rows.eq(rows),
+                self.slots.payload.columns.eq(columns),
+                found.eq(bad | found & ~first),
+                self.joined.eq(bad | Mux(number == len(line), found, self.joined)),
+            ]
+            with m.If(first):
+                m.d.sync += rises.eq(Cat(rows, columns))
         return m
 
     def _drive(self, m: Module, line: Value) -> Value:
@@ -101,45 +137,6 @@ class SelfTest(wiring.Component):
                     m.d.comb += judges.eq(1)
                     m.next = "REST"
         return judges
-
-    def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
-        waits = self.slots.valid
-        wanted = Signal()
-        tells = Signal()  # slots go out
-        over = Signal()
-        starts = Signal()
-        m.d.comb += [
-            over.eq(Mux(tells, waits & self.slots.ready, judges)),
-            starts.eq(wanted & (over | ~self.asks & ~waits)),
-        ]
-        with m.If(over):
-            m.d.sync += [waits.eq(0), self.asks.eq(number != last), number.eq(number + 1)]
-        with m.If(judges & tells):
-            m.d.sync += [waits.eq(1), self.asks.eq(0)]
-        with m.If(starts):
-            m.d.sync += [wanted.eq(0), tells.eq(1), self.asks.eq(1), number.eq(0)]
-        with m.If(self.command):
-            m.d.sync += wanted.eq(1)
-
-    def _judge(self, m: Module, judges: Value, number: Signal, line: Value) -> None:
-        rows, columns = self.rows, self.columns & anywhere(self.skin)
-        rises = Signal(len(line))  # in slot 0
-        first, found, follows, bad = Signal(), Signal(), Signal(len(line)), Signal()
-        of_row = line[: self.skin.rows].any()
-        m.d.comb += [
-            first.eq(number == 0),
-            follows.eq(Cat(Mux(of_row, rows, 0), columns) & ~line & ~rises),
-            bad.eq(Mux(first, rows.any() & ~columns.any(), follows.any())),
-        ]
-        with m.If(judges):
-            m.d.sync += [
-                self.slots.payload.rows.eq(rows),
-                self.slots.payload.columns.eq(columns),
-                found.eq(bad | found & ~first),
-                self.joined.eq(bad | Mux(number == len(line), found, self.joined)),
-            ]
-            with m.If(first):
-                m.d.sync += rises.eq(Cat(rows, columns))
 
     def drives(self) -> tuple[Value, Value]:
         """Rows and columns driven in the next clock; a guard column is discharged by its switches."""

@@ -31,6 +31,7 @@ class RowChain(wiring.Component):
         lines, clocks = derived.row_chain_lines, derived.shift_clocks
         pattern = on_lines(self.pattern, self.skin.line_of_row)
         levels = ~pattern if self.skin.selects_low else pattern
+        # Shift register clock, data and latch
         busy = Signal()
         left = Signal(range(lines + 1), init=lines)  # bits to shift; then the latch takes as long as one
         clock = Signal(range(clocks))
@@ -45,6 +46,7 @@ class RowChain(wiring.Component):
                 m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
         with m.Else():
             m.d.sync += self.pins.row_latch.eq(0)
+        # Enable
         with m.If(self.drive):
             m.d.sync += self.pins.row_enable_n.eq(0)
         with m.Elif(self.release):
@@ -72,6 +74,7 @@ class ColumnChain(wiring.Component):
         clock = Signal(range(clocks))
         ends = Signal()
         last = bit == lines
+        # Load pulse and shift clock
         # The pins lag this count by their register, what comes back by that and the synchronizer's two stages.
         taken, done = Signal(3), Signal(3)
         m.d.sync += [taken.eq(Cat(ends & (bit != 0), taken)), done.eq(Cat(ends & last, done))]
@@ -83,6 +86,7 @@ class ColumnChain(wiring.Component):
             m.d.sync += self.pins.column_clock.eq((bit > 1) & (clock < clocks // 2))
             with m.If(ends):
                 m.d.sync += bit.eq(Mux(last, 0, bit + 1))
+        # Levels
         synced = Signal(self.skin.column_chains)
         released = released_levels(self.skin, self.skin.column_chains)
         m.submodules.sync = FFSynchronizer(self.pins.column_data, synced, init=released)

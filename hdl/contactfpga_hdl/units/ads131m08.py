@@ -40,6 +40,7 @@ class Ads131m08(wiring.Component):
         self._pace(m)
         ready_n = Signal(init=1)
         before = Signal(init=1)
+        # Start, when a conversion is ready
         m.submodules.sync_ready = FFSynchronizer(self.pins.spi_ready_n, ready_n, init=1)
         m.d.sync += before.eq(ready_n)
         busy = Signal()
@@ -49,6 +50,7 @@ class Ads131m08(wiring.Component):
         level = Signal(range(LEVELS))  # odd ones are high, but for the last one
         begins, ends = clock == 0, clock == self.level_clocks - 1
         starts = before & ~ready_n & ~busy
+        # Levels of a frame
         with m.If(busy):
             m.d.sync += clock.eq(Mux(ends, 0, clock + 1))
             with m.If(ends):
@@ -57,6 +59,7 @@ class Ads131m08(wiring.Component):
                     m.d.sync += [busy.eq(skipped == 0), skipped.eq(Mux(counts, SKIPPED, skipped + 1))]
         with m.If(starts):
             m.d.sync += busy.eq(1)
+        # Pins
         m.d.sync += [
             self.sampled.eq(starts & counts),
             self.pins.spi_select_n.eq(~busy | (level == LEVELS - 1)),  # the pins follow a clock later

@@ -35,11 +35,13 @@ class Mcp3208(wiring.Component):
         last_unit = unit == self.skin.units - 1
         begins = clock == 0  # the pins follow a clock later
         ends = clock == self.level_clocks - 1
+        # Levels of a conversion, and its unit
         m.d.sync += clock.eq(Mux(ends, 0, clock + 1))
         with m.If(ends):
             m.d.sync += level.eq(Mux(level == LEVELS - 1, 0, level + 1))
             with m.If(level == LEVELS - 1):
                 m.d.sync += unit.eq(Mux(last_unit, 0, unit + 1))
+        # Pins
         command = Cat(Const(0b11, 2), unit[::-1])
         m.d.sync += [
             self.pins.spi_select_n.eq(level >= 2 * CLOCKS),

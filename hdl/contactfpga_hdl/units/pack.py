@@ -56,10 +56,12 @@ class UnitPacker(wiring.Component):
         write, read = store.write_port(), store.read_port()
         filling, waiting, sending = (Signal(2, init=init) for init in range(3))
         packet, commit = self.packet, self._write(m, write, filling)
+        # Regions rotate as a sweep completes or is taken
         with m.If(packet.taken):
             m.d.sync += [packet.due.eq(0), sending.eq(waiting), waiting.eq(sending)]
         with m.If(commit):
             m.d.sync += [packet.due.eq(1), waiting.eq(filling), filling.eq(Mux(packet.taken, sending, waiting))]
+        # Byte; the first is the stuffing's code
         starts = Signal()
         m.d.sync += starts.eq(packet.place == 0)
         code = 1 + plain_bytes(self.skin.units, self.derived.units.converter.bits)
@@ -75,6 +77,7 @@ class UnitPacker(wiring.Component):
         left = Signal(range(max(self._digits, TRAILER_DIGITS) + 1))
         place = Signal(PLACE_BITS)
         trails, closes = Signal(), Signal()
+        # Digits of a reading, then of the trailer
         with m.If(self.sampled):
             m.d.sync += begun.eq(clock.time - self.derived.units.delay_us)
         m.d.sync += closes.eq(0)

@@ -48,6 +48,7 @@ class Watch(wiring.Component):
             settings.unit.eq(self.reading.unit),
             self.armed.eq(settings.armed),
         ]
+        # Comparison of a reading
         m.d.sync += compares.eq(self.done)
         with m.If(self.done):
             m.d.sync += deviation.eq(self.reading.value - settings.zero)
@@ -57,6 +58,7 @@ class Watch(wiring.Component):
         if not self.skin.unit_sums:
             m.d.comb += self.over.eq(of_units.any())
             return m
+        # Comparison of sums
         m.submodules.sums = sums = Sums(self.skin)
         m.d.comb += [
             sums.taken.eq(compares),
@@ -164,6 +166,7 @@ class Sums(wiring.Component):
         ongoing = multiplies & (number != count - 1)
         m.d.comb += multiplies.eq(self.taken | busy)
         m.d.sync += [busy.eq(ongoing), number.eq(Mux(ongoing, number + 1, 0)), adds.eq(multiplies)]
+        # Product
         table = [[Const(rows[index][unit], signed(8)) for unit in range(self.skin.units)] for index in range(count)]
         assert MAX_WEIGHT < 128
         weight = Signal(signed(8))
@@ -171,6 +174,7 @@ class Sums(wiring.Component):
         product = Signal(signed(self._bits + 9))
         first, last = Signal(), Signal()
         m.d.sync += [product.eq(self.deviation * weight), first.eq(self.unit == 0), last.eq(self.last)]
+        # Totals
         totals = [Signal(self._total, name=f"total_{index}") for index in range(count)]
         added = Signal(self._total)
         m.d.comb += added.eq(Mux(first, 0, totals[0]) + product)
@@ -178,6 +182,7 @@ class Sums(wiring.Component):
             m.d.sync += [total.eq(after) for total, after in zip(totals, [*totals[1:], added], strict=True)]
         # High for as many clocks in a row as there are sums.
         m.d.sync += [compares.eq(adds & last), self.sum.eq(Mux(compares, self.sum + 1, 0))]
+        # Comparison, from the first sum on
         total = totals[-1]
         amount = Mux(total < 0, -total, total)
         with m.If(compares):

@@ -28,8 +28,8 @@ from contactfpga.wire import framing, protocol
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot
 from contactfpga.wire.hello import Hello, describe, difference
-from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import OldPacket, PacketError, frame_of
+from contactfpga.wire.sheet_number import sheet_of
 from contactfpga.wire.table import PacketTable
 from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.run import Run
@@ -317,8 +317,8 @@ class Conversation:
         plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
-            told = self._reader.take(plain)
-            return None if told is None else self._take_hello(told, now)
+            taken = self._reader.take(plain)
+            return None if taken is None else self._take_hello(taken, now)
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
             return self._take_lines(plain, hello)

@@ -27,7 +27,7 @@ class Lines:
     """
 
     def __init__(self, mask: Iterable[tuple[int, int]] = ()):
-        self.told: Faults | None = None
+        self.reported: Faults | None = None
         """The last report; None: none since power-up or a change of the Skin."""
         self.fading = False
         """Whether the next unflagged frame clears the names."""
@@ -36,10 +36,10 @@ class Lines:
         self._names: tuple[str, ...] = self._unnamed
 
     def forget(self) -> None:
-        self.told, self.fading, self._names = None, False, self._unnamed
+        self.reported, self.fading, self._names = None, False, self._unnamed
 
     def take_hello(self, hello: Hello) -> None:
-        unnamed = UNNAMED if hello.guard or (hello.self_test and self.told is None) else STUCK
+        unnamed = UNNAMED if hello.guard or (hello.self_test and self.reported is None) else STUCK
         if self._names == self._unnamed:
             self._names = (unnamed,)
         self._unnamed = (unnamed,)
@@ -49,7 +49,7 @@ class Lines:
         sheet = hello.sheet
         found = decode_faults(plain, sheet.rows, sheet.columns, hello.guard, hello.self_test)
         found = found.named(sheet.rows, sheet.columns, self._mask)
-        before, self.told = self.told or Faults(), found
+        before, self.reported = self.reported or Faults(), found
         self._unnamed = (UNNAMED if hello.guard else STUCK,)
         self.fading = not found and bool(before)
         if not self.fading:

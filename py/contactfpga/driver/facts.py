@@ -105,7 +105,7 @@ class BoardFacts:
         frame. None before the first report, or if the Skin has neither ``guard`` nor ``self_test``.
         """
         self._link.check_open()
-        return self._link.conversation.lines.told
+        return self._link.conversation.lines.reported
 
     @property
     def unit_history(self) -> UnitHistory | None:

@@ -77,7 +77,7 @@ class Cells:
 
 
 @dataclasses.dataclass
-class Heard:
+class LastRequest:
     """The last request, and how many more frames may have begun before it."""
 
     number: int = 0
@@ -114,7 +114,7 @@ class FlexitacPort:
         self._framer = Framer(address.rows * address.columns)
         self._cells = Cells(shape, address.frames, address.margin)
         self._frame_s = (address.rows * address.columns + len(MARK)) * BITS_PER_BYTE / address.baud
-        self._heard = Heard()
+        self._request = LastRequest()
         self._sent = 0
         self._out = bytearray()
         self._port = SerialTransport(address.device, address.baud)
@@ -133,7 +133,7 @@ class FlexitacPort:
             self._take(readings, max(self._time_us + 1, now_us - int(later * 1e6)))
         if self._sent and self._time_us - self._greeted_us >= HELLO_US:
             self._greeted_us = self._time_us
-            self._greet(self._time_us, self._heard.shown)
+            self._greet(self._time_us, self._request.shown)
         found = bytes(self._out)
         self._out.clear()
         return found
@@ -143,9 +143,9 @@ class FlexitacPort:
             self._out += DAMAGED
             return
         cells = self._cells.take(readings)
-        self._heard.older -= 1
-        if self._heard.older == 0:
-            self._heard.shown = self._heard.number
+        self._request.older -= 1
+        if self._request.older == 0:
+            self._request.shown = self._request.number
         self._time_us = time_us
         if cells is not None:
             self._out += self._packet(cells)
@@ -161,9 +161,9 @@ class FlexitacPort:
             if framing.kind_of(plain) != KIND_REQUEST:
                 continue
             # Of the frames that come next one is on its way already, and one may wait in the adapter.
-            self._heard = Heard(framing.number(plain[:HEARD_DIGITS]), 3, self._heard.shown)
+            self._request = LastRequest(framing.number(plain[:HEARD_DIGITS]), 3, self._request.shown)
             if plain[-1] & REQUEST_HELLO:
-                self._greet(int((self._port.clock() - self._begun_s) * 1e6), self._heard.number)
+                self._greet(int((self._port.clock() - self._begun_s) * 1e6), self._request.number)
 
     def _greet(self, time_us: int, heard: int) -> None:
         self._out += encode_hello(self._skin, self._sent, time_us >> EPOCH_BITS, heard)
@@ -176,7 +176,7 @@ class FlexitacPort:
         fields = (
             (self._time_us, TIME_BITS),
             (self._sent, SEQUENCE_BITS),
-            (self._heard.shown, HEARD_BITS),
+            (self._request.shown, HEARD_BITS),
             (int(cells.sum()), widths.area_bits),
         )
         for value, bits in fields:

@@ -138,8 +138,8 @@ def lines(board: Board, zones: Zones) -> Iterator[Finding]:
         count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"
         yield Finding("fault", f"{count} read pressed while no row is driven; look for a short circuit there")
         return
-    told = board.faults.names if board.faults else ()
-    for name in sorted({*zones.faults, *told}):
+    reported = board.faults.names if board.faults else ()
+    for name in sorted({*zones.faults, *reported}):
         step = next(step for end, step in NEXT_STEPS.items() if name.endswith(end))
         yield Finding("fault", f"{name}: {step}")
 
@@ -205,8 +205,8 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
             "note", f"{stats.unexplained} frames left out, as their times were not known before the next hello"
         )
     faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
-    told = ", ".join(f"{number} {name}" for name, number in faults.items())
-    yield Finding("fault" if any(faults.values()) else "ok", f"{told}{_second_reader(board)}")
+    counts = ", ".join(f"{number} {name}" for name, number in faults.items())
+    yield Finding("fault" if any(faults.values()) else "ok", f"{counts}{_second_reader(board)}")
     yield from lines(board, zones)
     yield from units(board)
     for flag in sorted(zones.flags - {"fault"}):

@@ -104,8 +104,8 @@ class Link:
         with self.changed:
             queue = FrameQueue(maxsize, all_events, self._frames)
             self._queues.add(queue)
-            if all_events and self.conversation.lines.told:
-                queue.put(self.conversation.lines.told)
+            if all_events and self.conversation.lines.reported:
+                queue.put(self.conversation.lines.reported)
         return queue
 
     def leave(self, queue: object) -> None:
@@ -415,7 +415,7 @@ def denied_error(name: str) -> NoSuchCommand:
     return NoSuchCommand(f"{name}: its publisher passes on no commands; {step}")
 
 
-class Said(Protocol):
+class PacketFacts(Protocol):
     """Part of a conversation that explains missing frames."""
 
     @property
@@ -427,11 +427,11 @@ class Said(Protocol):
         """Sheet numbers in packets before the first hello."""
 
 
-def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounters | None) -> ReadTimeout:
+def timed_out(name: str, timeout: float, packets: PacketFacts, start: int, net: NetCounters | None) -> ReadTimeout:
     """The error of a port without a frame within ``timeout`` seconds; ``start``: earlier bytes; ``net``: the network's
     counters.
     """
-    stats = said.stats
+    stats = packets.stats
     head = f"{name}: no frame within {timeout:g} s"
     if net is not None:
         head += refused(net)
@@ -441,7 +441,7 @@ def timed_out(name: str, timeout: float, said: Said, start: int, net: NetCounter
             f"`contactfpga doctor {shell_words(name)}` checks"
         )
     seen = f"{stats.bytes - start} bytes came"
-    if not stats.hellos and (numbers := sorted(said.numbers)):
+    if not stats.hellos and (numbers := sorted(packets.numbers)):
         ports = ", ".join(f"{name}#{number}" for number in numbers)
         return OnlyNoise(f"{name}: this board serves several sheets; open one of them: {ports}")
     if not stats.frames and not stats.hellos:

@@ -57,7 +57,7 @@ class Sheet(ctypes.Structure):
     ]
 
     @classmethod
-    def told(cls, widths: Widths, before: bytes) -> Sheet:
+    def of(cls, widths: Widths, before: bytes) -> Sheet:
         sheet = widths.sheet
         report = ("moments", "cells", "barycenter").index(sheet.report)
         return cls(
@@ -182,8 +182,8 @@ def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> PacketTab
     count = data.count(0)
     found, starts = np.empty(count, FIELDS), np.empty(count + 1, np.int64)
     records = np.empty((len(data) // widths.record_bytes, columns), np.int64)
-    told = Sheet.told(widths, before)
-    library().decode(told, data, len(data), found.ctypes.data, starts.ctypes.data, records.ctypes.data)
+    sheet = Sheet.of(widths, before)
+    library().decode(sheet, data, len(data), found.ctypes.data, starts.ctypes.data, records.ctypes.data)
     return PacketTable(found, starts, records[: starts[-1]])
 
 
@@ -289,12 +289,12 @@ class Port:
             frame_format = None
         if frame_format == self._decodes:
             return
-        told, self._columns = Sheet(), 3
+        sheet, self._columns = Sheet(), 3
         if frame_format is not None:
-            told = Sheet.told(*frame_format)
+            sheet = Sheet.of(*frame_format)
             self._columns, self._room = len(frame_format[0].record_bits), frame_format[0].max_items
         self._make_room()
-        self._library.sheet(self._address, ctypes.byref(told))
+        self._library.sheet(self._address, ctypes.byref(sheet))
         self._decodes = frame_format
 
     def _make_room(self) -> None:
@@ -353,13 +353,13 @@ class Port:
         self._library.settle(self._address, ctypes.byref(base), memory)
 
     def newest(self, packets: int) -> Newest | None:
-        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`Unsettled` if received
+        """The newest frame; None unless it is newer than packet ``packets``. Raises :class:`NewestUnknown` if received
         packets have to be taken first. Not thread-safe.
         """
         found = self._library.newest(self._address, packets, self._newest_at)
         if found <= 0:
             if found:
-                raise Unsettled
+                raise NewestUnknown
             return None
         values = _NEWEST_AND_FRAME.unpack_from(self._newest_view)
         frame = self._frame(values[8:], _NEWEST.size + 2 * FIELDS.itemsize)
@@ -377,5 +377,5 @@ class Port:
         return frame_of(fields, np.ndarray(shape, np.int64, copied), self._decodes[0].sheet)
 
 
-class Unsettled(Exception):
+class NewestUnknown(Exception):
     """The newest frame is unknown until received packets are taken."""

@@ -17,7 +17,7 @@ from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.events import Silence
 from contactfpga.driver.framequeue import FrameQueue
 from contactfpga.driver.link import READ_S, Link, Result, timed_out
-from contactfpga.driver.native import NativeFit, Port, Steady, Unsettled
+from contactfpga.driver.native import NativeFit, NewestUnknown, Port, Steady
 from contactfpga.driver.reads import Reads
 from contactfpga.driver.recording import RecordingTransport
 from contactfpga.driver.transport import SerialTransport, Transport
@@ -83,11 +83,11 @@ class NativeLink(Link):
     @property
     def conversation(self) -> Conversation:
         self.catch_up()
-        return self._said
+        return self._conversation
 
     @conversation.setter
-    def conversation(self, said: Conversation) -> None:
-        self._said = said
+    def conversation(self, conversation: Conversation) -> None:
+        self._conversation = conversation
 
     @property
     def last_s(self) -> float:
@@ -108,26 +108,26 @@ class NativeLink(Link):
                 if (found := self._core.take()) is not None:
                     self._take_reads(*found)
                 now = self.transport.clock()
-                self._said.pass_time(now, self._core.paused(now))
+                self._conversation.pass_time(now, self._core.paused(now))
             finally:
                 self._taking = False
             if self._failure is None and (failure := self._core.failure):
                 self._failure = self._port.lost(failure)
 
     def _take_reads(self, reads: Reads, begun: bytes, missing: int) -> None:
-        said = self._said
+        conversation = self._conversation
         if missing:
-            said.skip(missing, begun)
+            conversation.skip(missing, begun)
         if self._record is not None:
             for at in range(len(reads)):
                 self._record(reads.data_of(at), reads.at_s[at])
-        for at_s, events in said.take(reads):
+        for at_s, events in conversation.take(reads):
             for event in events:
                 self._pass_on(event)
                 if isinstance(event, Run):
                     self._last_s = at_s
         with self._showing:
-            self._core.decode(said.frame_format)
+            self._core.decode(conversation.frame_format)
 
     def queue(self, maxsize: int, all_events: bool) -> FrameQueue:
         with self.changed:
@@ -144,7 +144,7 @@ class NativeLink(Link):
     # ---- who waits
 
     def wait_for(self, found: Callable[[], Result | None], deadline: float, timeout: float) -> Result:
-        start = self._said.stats.bytes
+        start = self._conversation.stats.bytes
         while True:
             with self.changed:
                 self.check_open()
@@ -163,7 +163,7 @@ class NativeLink(Link):
             raise self._failure.with_traceback(None)
         if (left := deadline - self.transport.clock()) > 0:
             return left
-        raise timed_out(self.transport.name, timeout, self._said, start, self.net)
+        raise timed_out(self.transport.name, timeout, self._conversation, start, self.net)
 
     def linger(self, until: float, seconds: float) -> None:
         while (left := until - self.clock()) > 0 and self._failure is None:
@@ -171,11 +171,11 @@ class NativeLink(Link):
             self.catch_up()
 
     def newest(self, queue: FrameQueue, timeout: float) -> Zones | None:
-        deadline, start = self.clock() + timeout, self._said.stats.bytes
+        deadline, start = self.clock() + timeout, self._conversation.stats.bytes
         while True:
             try:
                 found = self._newest(queue)
-            except Unsettled:
+            except NewestUnknown:
                 return None
             if not isinstance(found, int):
                 return found
@@ -184,11 +184,11 @@ class NativeLink(Link):
 
     def _newest(self, queue: FrameQueue) -> Zones | int | None:
         """The newest frame that the queue has not had; otherwise the number of the packet after which it comes; None if
-        the queue decides. Raises :class:`Unsettled`.
+        the queue decides. Raises :class:`NewestUnknown`.
         """
         try:
             return self._show(queue)
-        except Unsettled:
+        except NewestUnknown:
             self._settle()
             return self._show(queue)
 
@@ -196,7 +196,7 @@ class NativeLink(Link):
         core = self._core
         with self._showing:
             if (base := self._base) is None:
-                raise Unsettled
+                raise NewestUnknown
             if queue.others:
                 return None
             steady, packets, more_frames = base
@@ -216,7 +216,7 @@ class NativeLink(Link):
         with self.changed:
             self.catch_up()
             with self._showing:
-                steady = self._said.steady()
+                steady = self._conversation.steady()
                 self._core.settle(steady)
                 packets = self._core.taken
                 self._base = None if steady is None else _Base(steady, packets, self._frames - packets)

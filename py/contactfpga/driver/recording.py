@@ -11,7 +11,7 @@ from typing import BinaryIO, Protocol
 from contactfpga.driver import forks
 from contactfpga.driver.transport import Transport, counters_of, skins_of
 from contactfpga.errors import ContactFPGAError
-from contactfpga.inputs.files import told
+from contactfpga.inputs.files import reason_of
 
 
 class Tap(Protocol):
@@ -52,7 +52,7 @@ class FileTap:
             forks.discard(self._file)
 
     def _failed(self, error: OSError) -> ContactFPGAError:
-        reason = error.strerror or told(error)
+        reason = error.strerror or reason_of(error)
         return ContactFPGAError(f"{self._path} cannot be written: {reason}; make room, then record again")
 
 
@@ -104,7 +104,7 @@ def create(path: str | Path) -> BinaryIO:
             refused.pop_all()
         return file
     except OSError as error:
-        raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
+        raise ContactFPGAError(f"{path} cannot be written: {error.strerror or reason_of(error)}") from None
 
 
 def _check_empty(path: str | Path, found: os.stat_result) -> None:

@@ -19,7 +19,7 @@ from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire import framing
 from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import Hello, HelloReader, begins_hello
-from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
+from contactfpga.wire.sheet_number import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
 READ_S = 0.05
 

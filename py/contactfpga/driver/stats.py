@@ -68,7 +68,7 @@ class Stats:
     sweeps_lost: int = 0
     """Sweeps that were damaged, or replaced by newer ones on a full line; each gap counts modulo 256."""
     sweeps_unexplained: int = 0
-    """Sweeps that were not passed on, because no frame told their times yet."""
+    """Sweeps that were not passed on, because no frame gave their times yet."""
     before_hello: int = 0
     """Packets before the first hello, which are unreadable."""
     unknown_kinds: int = 0

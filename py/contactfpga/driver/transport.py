@@ -18,7 +18,7 @@ from contactfpga.driver.address import Flexitac, Net, Replay, Serial, SheetOf, S
 from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
-from contactfpga.inputs.files import told
+from contactfpga.inputs.files import reason_of
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin
 
@@ -139,11 +139,11 @@ def _quieten(library: str) -> None:
         logger.setLevel(logging.WARNING)
 
 
-class Named(Protocol):
+class HasName(Protocol):
     name: str
 
 
-OPEN_PORTS: weakref.WeakSet[Named] = weakref.WeakSet()
+OPEN_PORTS: weakref.WeakSet[HasName] = weakref.WeakSet()
 
 
 def user_of(name: str) -> str:
@@ -269,7 +269,7 @@ def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
     try:
         board: SimulatedPort = opener(name, skin)
     except OSError as error:
-        raise PortNotFound(f"{name} cannot be opened: {told(error)}; is the path right?") from None
+        raise PortNotFound(f"{name} cannot be opened: {reason_of(error)}; is the path right?") from None
     return board
 
 

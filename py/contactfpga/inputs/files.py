@@ -70,7 +70,7 @@ def names_robot(port: str | None) -> TypeGuard[str]:
     return port is not None and port.endswith(".toml") and "://" not in port
 
 
-def told(error: OSError) -> str:
+def reason_of(error: OSError) -> str:
     """An OSError for a user: file and problem, without the number."""
     reason = error.strerror or str(error) or type(error).__name__
     return reason if error.filename is None else f"{os.fsdecode(error.filename)}: {reason}"

@@ -149,12 +149,12 @@ class CellHistory:
             if self._stuck[group].all() or (few and not self._alone(group, time_us)):
                 continue
             if not few and (self._stuck | self._held)[group].any():
-                continue  # a contact whose rim comes to rest is not told twice
+                continue  # a contact whose rim comes to rest is not reported twice
             since_us = int(self._changed_us[group].max())
             elsewhere = away_from(places(group), 1, self._sheet) & self._present
             others = int((elsewhere & (self._pressed_us > since_us) & (self._released_us > since_us)).sum())
             if others >= self._limits.needed(elsewhere):
-                yield self._told(group, few, since_us, others, time_us)
+                yield self._report(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
         """Whether nothing is, or was recently, pressed beside the group; otherwise the group may belong to a
@@ -163,9 +163,9 @@ class CellHistory:
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
 
-    def _told(self, group: np.ndarray, few: bool, since_us: int, others: int, time_us: int) -> Suspicion:
-        told = self._stuck if few else self._held
-        told |= group
+    def _report(self, group: np.ndarray, few: bool, since_us: int, others: int, time_us: int) -> Suspicion:
+        reported = self._stuck if few else self._held
+        reported |= group
         cells = places(group)
         what = f"{named(cells) if few else f'{len(cells)} cells about {self._middle(group)}'} pressed"
         changed = f"{others} other{'' if others == 1 else 's'} changed"
@@ -214,12 +214,12 @@ class ZoneHistory:
         self._first_us = first.time_us
         self._since_us = dict.fromkeys(_keys(first), first.time_us)
         self._came_us, self._left_us = (np.full(present.shape, -1) for _ in range(2))
-        self._told: dict[Key, tuple[Cell, ...]] = {}
+        self._reported: dict[Key, tuple[Cell, ...]] = {}
 
     @property
     def stuck(self) -> set[Cell]:
         """Cells reported as stuck, if known exactly, that have not changed since."""
-        return {cell for cells in self._told.values() for cell in cells}
+        return {cell for cells in self._reported.values() for cell in cells}
 
     flutters: frozenset[Cell] = frozenset()
     """Always empty: zones do not show which cells change."""
@@ -234,11 +234,11 @@ class ZoneHistory:
                 if not key[3]:
                     times[self._cell(key)] = time_us
         self._since_us = {key: self._since_us.get(key, time_us) for key in keys}
-        self._told = {key: cells for key, cells in self._told.items() if key in keys or self._may_have_joined(key)}
+        self._reported = {key: cells for key, cells in self._reported.items() if key in keys or self._may_join(key)}
 
     def suspicions(self, time_us: int) -> Iterator[Suspicion]:
         for key, since_us in self._since_us.items():
-            if key in self._told or since_us > time_us - self._limits.stuck_us:
+            if key in self._reported or since_us > time_us - self._limits.stuck_us:
                 continue
             elsewhere = away_from(self._middles(key), reach_of(key[0]), self._sheet) & self._present
             others = int((elsewhere & (self._came_us > since_us) & (self._left_us > since_us)).sum())
@@ -246,13 +246,13 @@ class ZoneHistory:
                 continue
             few = key[0] <= FEW_CELLS
             cells = cells_of(key[:3], self._sheet) if few else ()
-            self._told[key] = cells
+            self._reported[key] = cells
             seconds = (time_us - since_us) / 1e6
             came = "others came and went"
             sentence = unchanged(self._what(key, cells), not few, seconds, came, since_us == self._first_us)
             yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
 
-    def _may_have_joined(self, gone: Key) -> bool:
+    def _may_join(self, gone: Key) -> bool:
         middles = self._middles(gone)
         for key in self._since_us:
             away = away_from(middles, reach_of(gone[0]) + reach_of(key[0]), self._sheet)

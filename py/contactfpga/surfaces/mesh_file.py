@@ -101,8 +101,8 @@ def _text(data: bytes, path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
             elif key == b"endsolid":
                 ended = len(vertices)
             elif key == b"f":
-                told = [int(word.partition(b"/")[0]) for word in words]
-                first, *others = (one - 1 if one >= 0 else one + len(vertices) // 3 for one in told)
+                numbers = [int(word.partition(b"/")[0]) for word in words]
+                first, *others = (one - 1 if one >= 0 else one + len(vertices) // 3 for one in numbers)
                 faces.extend(itertools.chain.from_iterable((first, *pair) for pair in itertools.pairwise(others)))
         except ValueError:
             due = "three numbers with decimal points" if key == vertex else "whole numbers, of vertices"

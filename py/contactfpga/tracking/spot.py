@@ -22,20 +22,20 @@ SAME_S = 0.003
 COAST_S = 0.05
 
 
-class Known(NamedTuple):
+class Covariance(NamedTuple):
     """Covariance of place and speed along each axis, in mm^2, mm^2/s and mm^2/s^2."""
 
     place: float
     both: float
     speed: float
 
-    def later(self, seconds: float) -> Known:
+    def later(self, seconds: float) -> Covariance:
         spread = SUDDEN * seconds
         place = self.place + seconds * (2 * self.both + seconds * (self.speed + spread / 3))
-        return Known(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
+        return Covariance(place, self.both + seconds * (self.speed + spread / 2), self.speed + spread)
 
 
-NEW = Known(0.0, 0.0, FAST_MM_S**2)
+NEW = Covariance(0.0, 0.0, FAST_MM_S**2)
 """Covariance of a contact seen once."""
 
 
@@ -51,7 +51,7 @@ class Member:
     vx: float = 0.0
     """Speed on entering relative to the spot's, in mm/s."""
     vy: float = 0.0
-    known: Known = NEW
+    known: Covariance = NEW
     """Covariance on entering."""
     gone_us: int | None = None
     """Time at which it left the zone of others; None while it is there."""
@@ -78,7 +78,7 @@ class Spot:
         """Move the spot to a zone without speed: a zone that grew or shrank by a whole contact has not moved."""
         self.zone, self.seen_us, self.held = zone, time_us, False
         self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
-        self.known = Known(error_mm2(zone), 0.0, self.known.speed)
+        self.known = Covariance(error_mm2(zone), 0.0, self.known.speed)
         self.rest_us = time_us
 
     def ahead(self, time_us: int) -> tuple[float, float]:
@@ -121,13 +121,13 @@ class Spot:
         self.members.remove(member)
         self.center()
 
-    def correct(self, off_x: float, off_y: float, known: Known, error: float) -> None:
+    def correct(self, off_x: float, off_y: float, known: Covariance, error: float) -> None:
         """Correct by a zone's offset from the expected place; ``error``: variance of the zone's place."""
         at, both, speed = known
         gain, turn = at / (at + error), both / (at + error)
         self.fx, self.fy = self.fx + gain * off_x, self.fy + gain * off_y
         self.vx, self.vy = self.vx + turn * off_x, self.vy + turn * off_y
-        self.known = Known(at - gain * at, both - gain * both, speed - turn * both)
+        self.known = Covariance(at - gain * at, both - gain * both, speed - turn * both)
 
     def center(self) -> None:
         """Shift the contacts so that their barycenter is the zone's."""

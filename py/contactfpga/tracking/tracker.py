@@ -455,7 +455,7 @@ def shared_out(
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
         members.sort(key=rank)
-    # The one that it went by comes first, so that what parts from it is told after it.
+    # The one that it went by comes first, so that what parts from it is reported after it.
     first = spot.members[0]
     return sorted(zip(zones, found), key=lambda pair: first not in pair[1])
 

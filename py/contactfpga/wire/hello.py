@@ -12,7 +12,7 @@ from contactfpga.skin.derived import CHECK_BYTES, SELF_TEST, pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga.wire.units import FACTS_BYTES, UnitFacts
 
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
@@ -305,8 +305,8 @@ def describe(hello: Hello) -> str:
 
 def difference(hello: Hello, expected: Skin) -> str:
     """A board's Skin, and its difference from the expected one, in words."""
-    told, asked = _facts(hello), _expected_facts(expected)
-    differing = [f"{name} is {told[name]}, asked for was {asked[name]}" for name in told if told[name] != asked[name]]
+    sent, asked = _facts(hello), _expected_facts(expected)
+    differing = [f"{name} is {sent[name]}, asked for was {asked[name]}" for name in sent if sent[name] != asked[name]]
     if differing:
         what = "; ".join(differing)
     else:

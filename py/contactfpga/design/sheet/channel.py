@@ -10,7 +10,7 @@ import dataclasses
 import math
 from collections.abc import Iterable
 
-from contactfpga.design.sheet.drawn import CLEARANCE_MM, GND, POWER_MM, SUPPLY, TRACK_MM, VIA_MM, Drawing
+from contactfpga.design.sheet.drawing import CLEARANCE_MM, GND, POWER_MM, SUPPLY, TRACK_MM, VIA_MM, Drawing
 
 GRID_MM = 1.27
 LEVEL_MM = VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2

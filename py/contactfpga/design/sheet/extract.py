@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet.drawn import BOARDS, TRACK_MM, Drawing
+from contactfpga.design.sheet.drawing import BOARDS, TRACK_MM, Drawing
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SwitchPart
 from contactfpga.skin import Skin
@@ -36,7 +36,7 @@ CABLE_PF_M = 50.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Extracted:
+class LineValues:
     """Values of a layout's lines; capacitances in pF."""
 
     circuit: Circuit
@@ -51,7 +51,7 @@ class Extracted:
     column_neighbor_pf: float
 
 
-def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
+def extracted(layout: Layout, cable_m: float = 0.3) -> LineValues:
     """The circuit of a layout with ``cable_m`` of ribbon cable at its connectors."""
     skin, switch = layout.skin, layout.switch
     _, h, eps = BOARDS[skin.surface]
@@ -70,7 +70,7 @@ def extracted(layout: Layout, cable_m: float = 0.3) -> Extracted:
         neighbor_pf=_said(max(row_neighbor, column_neighbor)),
         line_ohm=_said(max(rows + columns, default=0.0)),
     )
-    return Extracted(
+    return LineValues(
         circuit,
         (min(rows, default=0.0), max(rows, default=0.0)),
         (min(columns, default=0.0), max(columns, default=0.0)),

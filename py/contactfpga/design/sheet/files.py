@@ -14,7 +14,7 @@ from pathlib import Path
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import gerber, kicad, picture
 from contactfpga.design.sheet.caps import Caps
-from contactfpga.design.sheet.drawn import BOARDS
+from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from contactfpga.design.sheet.drawn import (
+from contactfpga.design.sheet.drawing import (
     MASK_MM,
     PRINT_MM,
     VIA_DRILL_MM,

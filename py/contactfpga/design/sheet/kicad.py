@@ -11,7 +11,7 @@ import json
 import uuid
 from collections.abc import Iterable, Iterator
 
-from contactfpga.design.sheet.drawn import (
+from contactfpga.design.sheet.drawing import (
     CLEARANCE_MM,
     EDGE_MM,
     MASK_MM,

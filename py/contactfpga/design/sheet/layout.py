@@ -13,7 +13,7 @@ import math
 from contactfpga.boards import wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import strip
-from contactfpga.design.sheet.drawn import CLEARANCE_MM, EDGE_MM, TRACK_MM, VIA_MM, Drawing, Hole
+from contactfpga.design.sheet.drawing import CLEARANCE_MM, EDGE_MM, TRACK_MM, VIA_MM, Drawing, Hole
 from contactfpga.design.sheet.parts import DIODE, DIODE_VIA, SWITCHES, SheetError, SwitchPart, find_switch
 from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin

@@ -6,7 +6,7 @@ import collections
 from collections.abc import Iterable, Iterator, Sequence
 
 from contactfpga import picture_style
-from contactfpga.design.sheet.drawn import PRINT_MM, VIA_DRILL_MM, VIA_MM, CopperTrack, Drawing, Layer, Stroke
+from contactfpga.design.sheet.drawing import PRINT_MM, VIA_DRILL_MM, VIA_MM, CopperTrack, Drawing, Layer, Stroke
 from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}

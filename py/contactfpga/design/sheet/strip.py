@@ -14,7 +14,7 @@ from contactfpga.boards import spec, wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import channel
 from contactfpga.design.sheet.channel import GRID_MM, Grid, Pin
-from contactfpga.design.sheet.drawn import GND, SUPPLY, VIA_MM, Drawing
+from contactfpga.design.sheet.drawing import GND, SUPPLY, VIA_MM, Drawing
 from contactfpga.design.sheet.parts import CAPACITOR, HC165, HC595, HEADER_PINS, RESISTOR, Part, header, smallest_header
 from contactfpga.skin import Skin
 

@@ -125,8 +125,8 @@ def _joint(element: ElementTree.Element) -> Joint:
     ends = [_text(_child(element, tag, where), "link", f"{tag} of {where}") for tag in ("parent", "child")]
     axis = np.zeros(3)
     if kind in MOVING:
-        told = element.find("axis")
-        axis = np.array((1.0, 0.0, 0.0) if told is None else vector(told, "xyz", where))
+        given = element.find("axis")
+        axis = np.array((1.0, 0.0, 0.0) if given is None else vector(given, "xyz", where))
         length = float(np.linalg.norm(axis))
         if length < 1e-9:
             raise BodyError(f"the axis of {where} has no direction")
@@ -135,11 +135,11 @@ def _joint(element: ElementTree.Element) -> Joint:
 
 
 def _mimic(element: ElementTree.Element, where: str) -> tuple[str, float, float] | None:
-    told = element.find("mimic")
-    if told is None:
+    mimic = element.find("mimic")
+    if mimic is None:
         return None
-    factor, offset = (_number(told.get(key, usual), where) for key, usual in (("multiplier", "1"), ("offset", "0")))
-    return _text(told, "joint", f"mimic of {where}"), factor, offset
+    factor, offset = (_number(mimic.get(key, usual), where) for key, usual in (("multiplier", "1"), ("offset", "0")))
+    return _text(mimic, "joint", f"mimic of {where}"), factor, offset
 
 
 def _child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element:

@@ -20,10 +20,10 @@ def add_flags(flag: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from contactfpga.tools.view import plot, replayed
+    from contactfpga.tools.view import board_recording, plot
 
     with terminal.reading(args.recording) as tell:
-        recording = replayed.load(args.recording, args.link, reading=tell)
+        recording = board_recording.load(args.recording, args.link, reading=tell)
     path = Path(args.output or f"{Path(args.recording).stem}.png")
     if path.suffix.lower() not in ENDINGS:
         raise ValueError(f"--output is {str(path)!r}; it must end in {' or '.join(ENDINGS)}")

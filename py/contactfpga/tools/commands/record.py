@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace) -> int:
-    from contactfpga.robot.body import packed
+    from contactfpga.robot.body import robot_texts
     from contactfpga.tools.recordings.recorder import Session, Split
 
     flags.check_forces(args)
@@ -56,7 +56,7 @@ def _record(args: argparse.Namespace) -> int:
     split = None
     if args.split_mb is not None or args.split_s is not None:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
-    about = {} if body is None else {packed.ROBOT: packed.pack(args.port)}
+    about = {} if body is None else {robot_texts.ROBOT: robot_texts.pack(args.port)}
     session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session, args)
     try:

@@ -13,7 +13,7 @@ from contactfpga.design import kits
 from contactfpga.design.circuit import load_checked
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import SWITCHES, lay_out
-from contactfpga.design.sheet.drawn import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
+from contactfpga.design.sheet.drawing import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
 from contactfpga.design.sheet.layout import MARGIN_MM
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shell_words

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 
 from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError
-from contactfpga.inputs.files import told
+from contactfpga.inputs.files import reason_of
 from contactfpga.inputs.values import shortened, visible_lines
 from contactfpga.shipped import with_pages
 from contactfpga.tools.console import signals
@@ -89,7 +89,7 @@ def _status(body: Callable[[], int | None]) -> int:
         return 0
     except OSError as error:
         terminal.drop_unwritable()
-        return failed(_told(error))
+        return failed(_reason_of(error))
     except Exception:
         if _came is None:
             raise
@@ -101,7 +101,7 @@ def _cut_short(said: str = "") -> int:
     _run = None
     number = signal.SIGINT if _came is None else _came
     if threading.current_thread() is threading.main_thread():
-        signals.end_all_at_once()  # should it be told twice
+        signals.end_all_at_once()  # should it be asked twice
     if said:
         terminal.say(f"contactfpga: {said}", sys.stderr, hang=2)
     return signals.status(number)
@@ -117,10 +117,10 @@ def usual_end() -> Iterator[None]:
         _came = None
 
 
-def _told(error: OSError) -> str:
+def _reason_of(error: OSError) -> str:
     if error.errno == errno.ENOSPC and error.filename is None:  # of what is printed, the system names no file
-        return f"there is no room where the output goes: {told(error)}"
-    return told(error)
+        return f"there is no room where the output goes: {reason_of(error)}"
+    return reason_of(error)
 
 
 def failed(reason: object) -> int:

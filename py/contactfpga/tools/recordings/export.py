@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.inputs.files import replaced, told
+from contactfpga.inputs.files import reason_of, replaced
 from contactfpga.robot.ros.convert import flag_bits
 from contactfpga.tools.recordings.recording import Recording
 from contactfpga.tracking.tracker import Tracker
@@ -123,7 +123,7 @@ def export(recording: Recording, path: str | Path) -> int:
         with replaced(target) as new:
             write(new, counted(), facts(recording))
     except OSError as error:
-        raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
+        raise ContactFPGAError(f"{path} cannot be written: {error.strerror or reason_of(error)}") from None
     return rows
 
 

@@ -122,8 +122,8 @@ class LinkRecorder:
                         self._clock_s()
                         self._drain()
                         self._files.poll()
-                    except (SkinMismatch, VersionMismatch) as told:
-                        self.notes.append(str(told))
+                    except (SkinMismatch, VersionMismatch) as mismatch:
+                        self.notes.append(str(mismatch))
                 left = self._take_rest(frames)
                 if left := left + self._events.dropped:
                     self.notes.append(
@@ -146,13 +146,13 @@ class LinkRecorder:
                 return item
             clock_s = self._clock_s()
             if self._said is not None and not isinstance(item, Silence):
-                self._said.told(item, clock_s)
+                self._said.write_event(item, clock_s)
             self._drain()
 
     def finish(self) -> None:
         """Close the board and write what is left."""
         self.board.close()
-        with contextlib.suppress(RecordingFailed):  # was told before
+        with contextlib.suppress(RecordingFailed):  # was reported before
             self._drain(rest=True)
 
     def wait_for_hello(self) -> None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from contactfpga.driver.address import MAX_LINKS, MAX_NAME
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.files import open_regular, reason_of
 from contactfpga.inputs.values import shell_words
 
 if TYPE_CHECKING:
@@ -402,7 +402,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
     try:
         file = open_regular(path)
     except OSError as error:
-        raise RecordingError(f"{path} cannot be opened: {error.strerror or told(error)}") from None
+        raise RecordingError(f"{path} cannot be opened: {error.strerror or reason_of(error)}") from None
     with file:
         if file.read(len(MAGIC)) != MAGIC:
             raise RecordingError(f"{path} is no MCAP file")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.inputs.files import told
+from contactfpga.inputs.files import reason_of
 from contactfpga.inputs.values import shell_words
 from contactfpga.robot.ros.types import schema
 
@@ -43,7 +43,7 @@ class WholeFile:
             reason = "is there already; name a new file, or remove it first"
             raise RecordingFailed(f"{path} {reason}", reason) from None
         except OSError as error:
-            reason = error.strerror or told(error)
+            reason = error.strerror or reason_of(error)
             raise RecordingFailed(f"{path} cannot be written: {reason}", reason) from None
 
     def tell(self) -> int:
@@ -73,7 +73,7 @@ class WholeFile:
 
     def _failed(self, error: OSError) -> RecordingFailed:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        reason = f"there is no room for more ({error.strerror})" if full else error.strerror or told(error)
+        reason = f"there is no room for more ({error.strerror})" if full else error.strerror or reason_of(error)
         if not self.holds_messages:
             self.close()
             with contextlib.suppress(OSError):

@@ -78,7 +78,7 @@ class LinkMessages:
         self._drawn_s = -1.0
         self._rim = outline(link.board.sheet, None if mount is None else mount.place)
 
-    def told(self, item: SideEvent, clock_s: float) -> None:
+    def write_event(self, item: SideEvent, clock_s: float) -> None:
         time_ns = self._link.time_ns(clock_s)
         if isinstance(item, Faults):
             self._link.write("faults", FAULTS, of_faults(item.names, time_ns, self._frame), clock_s)
@@ -102,8 +102,8 @@ class LinkMessages:
             self._put("wrench", WRENCH, convert.wrench(forces.wrench, head), clock_s)
         drawn = clock_s - self._drawn_s >= DRAWN_S or clock_s < self._drawn_s
         if drawn or tracks.events:
-            told = convert.tracks(tracks, tracks.events, tracks.restarted, head)
-            self._put("tracks", TRACKS, told, clock_s)
+            message = convert.tracks(tracks, tracks.events, tracks.restarted, head)
+            self._put("tracks", TRACKS, message, clock_s)
         if drawn:
             self._drawn_s = clock_s
             self._put("markers", MARKERS, markers(self._rim, tracks.active, head, forces), clock_s)

@@ -15,7 +15,7 @@ from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.pace import DeviceClock
 from contactfpga.errors import SkinError, VersionMismatch
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.files import open_regular, reason_of
 from contactfpga.inputs.values import is_finite
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import LONGEST_PACKET
@@ -57,7 +57,7 @@ class Recording:
                 self.timed = file.read(len(MAGIC)) == MAGIC
                 """Whether arrival times are known; without them, times are the board's own since its first frame."""
         except (OSError, ValueError) as error:
-            why = error.strerror or told(error) if isinstance(error, OSError) else error
+            why = error.strerror or reason_of(error) if isinstance(error, OSError) else error
             raise RecordingError(f"{path} cannot be opened: {why}; is the path right?") from None
         parts = [McapPart(one) for one in files] if self.timed else []
         held = {link for part in parts for link in part.links}
@@ -95,10 +95,10 @@ class Recording:
         """The first hello of each link, whose ``sheet`` has lines and lengths, in order of addition. Links without a
         hello are omitted, as their frames are unreadable. Raises :class:`ContactFPGAError` if none is left.
         """
-        told = {link: self._hello(link) for link in (self._names if self.timed else [UNNAMED])}
-        found = {link: hello for link, hello in told.items() if isinstance(hello, Hello)}
+        hellos = {link: self._hello(link) for link in (self._names if self.timed else [UNNAMED])}
+        found = {link: hello for link, hello in hellos.items() if isinstance(hello, Hello)}
         if not found:
-            old = (one for one in told.values() if isinstance(one, VersionMismatch))
+            old = (one for one in hellos.values() if isinstance(one, VersionMismatch))
             raise next(old, RecordingError(f"{self.path} holds no hello; its frames cannot be read"))
         return found if self.timed else {hello.name or UNNAMED: hello for hello in found.values()}
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.inputs.files import replaced, told
+from contactfpga.inputs.files import reason_of, replaced
 from contactfpga.tools.recordings.mcap import (
     LARGEST,
     MAGIC,
@@ -81,7 +81,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
         except struct.error:
             raise RecordingError(f"{source} has more channels or schemas than a file can hold") from None
         except OSError as error:
-            raise RecordingError(f"{target} cannot be written: {error.strerror or told(error)}") from None
+            raise RecordingError(f"{target} cannot be written: {error.strerror or reason_of(error)}") from None
     return found
 
 

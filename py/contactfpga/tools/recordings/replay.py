@@ -10,7 +10,7 @@ from contactfpga.driver.address import REPLAY_FORM, Replay
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.pace import DeviceClock, Pace
 from contactfpga.errors import AddressError, ContactFPGAError, PortNotFound, ReplayEnded
-from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.files import open_regular, reason_of
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.tools.recordings.mcap import RecordingError, files_of
 from contactfpga.tools.recordings.recording import CHUNK, Recording
@@ -63,7 +63,7 @@ def _opened(name: str, asked: Replay) -> Iterator[bytes]:
         open_regular(files_of(asked.path)[0]).close()
     except OSError as error:
         hint = f"the options are {REPLAY_FORM}" if _UNKNOWN.search(name) else "is the path right?"
-        raise PortNotFound(f"{name} cannot be opened: {error.strerror or told(error)}; {hint}") from None
+        raise PortNotFound(f"{name} cannot be opened: {error.strerror or reason_of(error)}; {hint}") from None
     except ValueError as error:  # a path with a zero byte
         raise AddressError(f"{name} cannot be opened: {error}") from None
     recording = Recording(asked.path)

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
-from contactfpga.robot.body import Body, LinkContact, LinkState, packed
+from contactfpga.robot.body import Body, LinkContact, LinkState, robot_texts
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import open_board
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from contactfpga.tools.recordings.recording import Recording
 
 STEP_S = 0.04
-TOLD_S = 0.25
+WRITTEN_S = 0.25
 TURN_RAD = 3.15
 
 OVERVIEW = "overview"
@@ -143,7 +143,7 @@ class RobotView(abc.ABC):
         page.dress(server)
         light(server, (1.0, -0.5, 1.0))
         self.cameras = Cameras(server, dict(ROBOT_SIDES), points)
-        self._stepped_s = self._told_s = 0.0
+        self._stepped_s = self._written_s = 0.0
         self._rows: list[contacts.Row] = []
         self._table = server.gui.add_html(contacts.table(()))
 
@@ -155,8 +155,8 @@ class RobotView(abc.ABC):
         time.sleep(max(0.0, STEP_S - (time.monotonic() - self._stepped_s)))
         self._stepped_s = time.monotonic()
         self._rows = self.draw()
-        if self._stepped_s - self._told_s > TOLD_S:
-            self._told_s = self._stepped_s
+        if self._stepped_s - self._written_s > WRITTEN_S:
+            self._written_s = self._stepped_s
             self.tell()
 
     @abc.abstractmethod
@@ -225,10 +225,10 @@ class BodyView(RobotView):
             rows.append(("moment", f"{source.position_s:.3f} of {source.duration_s:.3f} s"))
         if left_out := self.stage.left_out():
             rows.append(("meshes", left_out))
-        return rows + [(name, told(state)) for name, state in self._states.items()]
+        return rows + [(name, state_line(state)) for name, state in self._states.items()]
 
 
-def told(state: LinkState) -> str:
+def state_line(state: LinkState) -> str:
     found = 0 if state.zones is None else len(state.zones)
     zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
     return f"{state}{zones}"
@@ -256,7 +256,7 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
         self._recording = recording
         self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
         try:
-            self.body = packed.unpack(recording.texts(packed.ROBOT)[0], Path(self._folder.name))
+            self.body = robot_texts.unpack(recording.texts(robot_texts.ROBOT)[0], Path(self._folder.name))
         except BaseException:
             self._folder.cleanup()
             raise
@@ -296,5 +296,5 @@ class BodyPlayer(Playback[tuple[str, Zones]]):
 
 def holds_robot(recording: Recording) -> bool:
     """Whether a recording has a robot with all files of its table, which earlier versions omitted."""
-    texts = recording.texts(packed.ROBOT)
-    return bool(texts) and set(texts[0]) != {packed.TOML}
+    texts = recording.texts(robot_texts.ROBOT)
+    return bool(texts) and set(texts[0]) != {robot_texts.TOML}

@@ -31,7 +31,7 @@ class Side:
 
 
 @dataclasses.dataclass(frozen=True)
-class Placed:
+class CameraPose:
     """A camera, in m."""
 
     position: np.ndarray
@@ -39,7 +39,7 @@ class Placed:
     """Middle of its picture, at the depth of the scene's middle."""
 
 
-def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_RAD) -> Placed:
+def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_RAD) -> CameraPose:
     """The nearest camera on this side whose picture holds all (n, 3) points, centered; ``aspect``: width over height.
 
     A camera at c sees a point p where ``|(p - c) . right| <= t (p - c) . ahead``, and the same upward. In each
@@ -61,7 +61,7 @@ def fitted(points: np.ndarray, side: Side, aspect: float, fov_rad: float = FOV_R
     depth = min(far_x, far_y)
     position = across * right + up * upward + depth * ahead
     middle = (float(depths.min()) + float(depths.max())) / 2
-    return Placed(position, position + (middle - depth) * ahead)
+    return CameraPose(position, position + (middle - depth) * ahead)
 
 
 def sides_of(tiles: Tiles) -> dict[str, Side]:

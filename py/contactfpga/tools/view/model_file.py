@@ -76,5 +76,5 @@ if __name__ == "__main__":
             import resource
 
             resource.setrlimit(getattr(resource, f"RLIMIT_{kind}"), (most, most))
-    print(told := _fault(sys.argv[1]))
-    sys.exit(bool(told))
+    print(fault := _fault(sys.argv[1]))
+    sys.exit(bool(fault))

@@ -22,15 +22,15 @@ from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.tools.view import page, server
+from contactfpga.tools.view.board_recording import Reading, is_recording, load, silent
 from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, RobotView, holds_robot
 from contactfpga.tools.view.cameras import Cameras, sides_of
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import Panel
 from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.pushing import SimulatedView
-from contactfpga.tools.view.replayed import Reading, is_recording, load, silent
+from contactfpga.tools.view.robot_source import SimulatedSource
 from contactfpga.tools.view.server import Guard
-from contactfpga.tools.view.simulated import SimulatedSource
 from contactfpga.tools.view.sources import BoardSource, Moment, Source
 from contactfpga.tools.view.stage import Stage
 from contactfpga.tools.view.tiles import Tiles
@@ -50,7 +50,7 @@ class View:
         self.stage = Stage(server, Tiles(source.sheet), source.cells)
         self.cameras = Cameras(server, sides_of(self.stage.tiles), lambda: self.stage.points_m)
         self.panel = Panel(server, source, hand, self.cameras)
-        self._told_s = 0.0
+        self._written_s = 0.0
         self._moment: Moment | None = None
         self.drawn = 0
         if hand is not None:
@@ -62,8 +62,8 @@ class View:
             self._moment = moment
             self.stage.draw(moment)
             self.drawn += 1
-        if (now := time.monotonic()) - self._told_s > PANEL_S:
-            self._told_s = now
+        if (now := time.monotonic()) - self._written_s > PANEL_S:
+            self._written_s = now
             self.panel.write(self._moment)
 
 

@@ -119,7 +119,7 @@ def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
         rows.append(("pressed", f"{moment.zones.pressed} cells"))
         flags = sorted(moment.zones.flags | set(moment.zones.faults))
         rows += [("flags", ", ".join(flags))] if flags else []
-    return rows + source.told()
+    return rows + source.facts()
 
 
 def as_markdown(rows: Iterable[tuple[str, str]]) -> str:

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 from contactfpga.driver.pace import Pace
 from contactfpga.driver.stats import Stats
 from contactfpga.robot.haptics import LoadCells
-from contactfpga.tools.view.replayed import BoardRecording
+from contactfpga.tools.view.board_recording import BoardRecording
 from contactfpga.tools.view.sources import STEP_S, Meter, Moment
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
@@ -122,7 +122,7 @@ class Player(Playback[Zones]):
         self.meter.take(Batch.of(self._taken), Stats(), 0)
         return Moment(self._taken[-1], self._tracks)
 
-    def told(self) -> list[tuple[str, str]]:
+    def facts(self) -> list[tuple[str, str]]:
         return [("moment", f"{self.position_s:.3f} of {self.duration_s:.3f} s")]
 
     def begin(self, start_s: float) -> Iterator[tuple[float, Zones]]:

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from contactfpga import picture_style as style
 from contactfpga.skin.sheet import Sheet
-from contactfpga.tools.view.replayed import BoardRecording
+from contactfpga.tools.view.board_recording import BoardRecording
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga.tools.view import chart, contacts, obstacle
-from contactfpga.tools.view.bodies import OVERVIEW, ROBOT_SIDES, DrawnRobot, RobotView, pushes, told
+from contactfpga.tools.view.bodies import OVERVIEW, ROBOT_SIDES, DrawnRobot, RobotView, pushes, state_line
 from contactfpga.tools.view.cameras import Side
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.panel import MOST_N, shortened
+from contactfpga.tools.view.robot_source import ALL, BARE, NO_REFLEX, SKINS, SWEEP_S, RobotCopy, SimulatedSource
 from contactfpga.tools.view.robot_stage import ROOT, RobotStage
-from contactfpga.tools.view.simulated import ALL, BARE, NO_REFLEX, SKINS, SWEEP_S, RobotCopy, SimulatedSource
 from contactfpga.tools.view.sources import KEEPS_UP
 from contactfpga.tools.view.tiles import MM
 
@@ -68,7 +68,7 @@ class SimulatedView(RobotView):
             self._names[number].position = (0.0, 0.0, float(self.stage.points_m()[:, 2].max()) + ABOVE * radius)
             self._names[number].visible = len(copies) > 1
             for sheet in stage.stages.values():
-                sheet.told = contacts.MOST if len(copies) == 1 else 0  # the table has them
+                sheet.labeled = contacts.MOST if len(copies) == 1 else 0  # the table has them
 
     def _add_stage(self) -> None:
         node = f"{ROOT}{len(self._stages)}"
@@ -188,8 +188,9 @@ class SimulatedView(RobotView):
         rows = [("source", shortened(source.title))]
         for copy in self._drawn:
             for name, state in copy.states().items():
-                known = "no skin" if copy.skin == BARE else told(state)
-                rows.append((f"{name}, {copy.skin}" if len(self._drawn) > 1 else name, f"{known}; {copy.told(name)}"))
+                known = "no skin" if copy.skin == BARE else state_line(state)
+                title = f"{name}, {copy.skin}" if len(self._drawn) > 1 else name
+                rows.append((title, f"{known}; {copy.pressed_by(name)}"))
         if source.share <= KEEPS_UP:
             rows.append(("simulated", f"at {source.share:.0%} of real time"))
         return rows

@@ -125,11 +125,11 @@ class RobotStage:
 
     def left_out(self) -> str:
         """Which meshes are not drawn, and why; empty if all are."""
-        told = "".join(
+        missing = "".join(
             f"{len(names)} {reason}: {', '.join(list(names)[:NAMED])}{', ...' if len(names) > NAMED else ''}; "
             for reason, names in self._left_out.items()
         )
-        return f"{told}lines between joints are drawn" if told else ""
+        return f"{missing}lines between joints are drawn" if missing else ""
 
     def _add(self, solid: Solid) -> None:
         box = np.array(list(itertools.product(*zip(solid.vertices_m.min(0), solid.vertices_m.max(0)))))

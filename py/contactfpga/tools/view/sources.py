@@ -60,7 +60,7 @@ class Source(Protocol):
     def poll(self) -> Moment | None:
         """Wait briefly for a new moment; None: nothing new. Raises the board's errors."""
 
-    def told(self) -> list[tuple[str, str]]:
+    def facts(self) -> list[tuple[str, str]]:
         """Further facts, as name and value."""
 
     @property
@@ -130,7 +130,7 @@ class BoardSource:
     def frames(self, seconds: float) -> Batch:
         return self._frames.batch(seconds, seconds)
 
-    def told(self) -> list[tuple[str, str]]:
+    def facts(self) -> list[tuple[str, str]]:
         stats = self.meter.stats
         silent_s = self._board.silence.seconds
         rows = [("no data", f"for {silent_s:.1f} s; what is drawn is older")] if silent_s > SILENT_S else []

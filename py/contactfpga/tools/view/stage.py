@@ -64,7 +64,7 @@ class Stage:
         self._lines: dict[str, Any] = {}
         self._points: Any = None
         self._labels: list[Any] = []
-        self.told = contacts.MOST
+        self.labeled = contacts.MOST
         self._glow = glow.Glow(server, f"{node}/glow", tiles, under_mm) if carried else None
         self._trails = picture.Trails(tiles.surface, self._lift_mm + 0.03 * self._pitch_mm)
         self._colors: np.ndarray | None = None
@@ -175,7 +175,7 @@ class Stage:
             assert row.y_mm is not None
             point, normal = self.tiles.surface.place(row.x_mm, row.y_mm)
             label.position = (np.array(point) + (self._lift_mm + 0.9 * self._pitch_mm) * np.array(normal)) * MM
-            label.text = "\n".join(row.lines) if number < self.told else row.name
+            label.text = "\n".join(row.lines) if number < self.labeled else row.name
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False

@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import kept, size
+from contactfpga_sim.apps import result_cache, size
 from contactfpga_sim.apps.fit.trial import SoFar, Step, Trial, gathered
 
 DEVICE = sizes.UP5K
@@ -32,6 +32,7 @@ def sized(
 
 def luts_of(skin: Skin) -> int:
     """LUT4 of the design; takes seconds unless cached."""
-    key = f"{kept.made_by(__name__, skin)} {size.tools(DEVICE)}"  # spares looking at the netlist of the same Skin again
-    found: int = kept.kept("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
+    # A cached count spares looking at the netlist of the same Skin again.
+    key = f"{result_cache.made_by(__name__, skin)} {size.tools(DEVICE)}"
+    found: int = result_cache.cached("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
     return found

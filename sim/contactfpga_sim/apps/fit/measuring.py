@@ -11,7 +11,7 @@ from typing import Any
 from contactfpga.choices import labellers
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import errors, kept, speed, stats
+from contactfpga_sim.apps import errors, result_cache, speed, stats
 from contactfpga_sim.apps.errors import METRICS, Look
 from contactfpga_sim.apps.fit import faces
 from contactfpga_sim.apps.fit.sources import Recorded, Source
@@ -79,7 +79,8 @@ def _batch(
         felt = {"unfelt": faces.unfelt(cover, pitch, force_n, numbers)}
         return [one | felt for one in values]
 
-    found: list[Values] = kept.kept("fit-errors", _key(task, source, skins, cover, numbers, count, force_n), new)
+    key = _key(task, source, skins, cover, numbers, count, force_n)
+    found: list[Values] = result_cache.cached("fit-errors", key, new)
     return found
 
 
@@ -106,8 +107,8 @@ def speed_of(task: FitTask, source: Source, skin: Skin, cover: Cover | None, oth
     count = source.most(task.count)
     timed = min(task.timed, count)
     numbers = [others * count + index * count // timed for index in range(timed)]
-    return Speed(**kept.kept("fit-speed", _key(task, source, [skin], cover, numbers, count, checked), new))
+    return Speed(**result_cache.cached("fit-speed", _key(task, source, [skin], cover, numbers, count, checked), new))
 
 
 def _key(task: FitTask, source: Source, skins: Sequence[Skin], cover: Cover | None, *more: Any) -> str:
-    return "\n".join((kept.made_by(__name__, *skins, task.base), repr(source), repr(cover), repr(more)))
+    return "\n".join((result_cache.made_by(__name__, *skins, task.base), repr(source), repr(cover), repr(more)))

@@ -82,7 +82,7 @@ class GoldenBoard:
             time_us=begun // known.clocks_per_us,
             requested=len(answered) > self._asked,
             heard=last_number(requests, begun) % 8,
-            told=0,
+            reported=0,
         )
         self._asked = len(answered)
         if known.zones:

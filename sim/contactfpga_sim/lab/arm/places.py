@@ -14,7 +14,7 @@ import numpy as np
 
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.arm.case import STEPS_A_TIME_CONSTANT, Case, CaseError
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import ENDS_M, STEP_S
@@ -84,8 +84,8 @@ def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
     """Peak force in N, peak indentation in m and whether the torque limit reacted first, of each touch for each way.
     Cached."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
-    key = f"{kept.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
-    found: list[list[tuple[float, float, bool]]] = kept.kept("places", key, lambda: _touched(batch))
+    key = f"{result_cache.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
+    found: list[list[tuple[float, float, bool]]] = result_cache.cached("places", key, lambda: _touched(batch))
     return found
 
 
@@ -133,8 +133,8 @@ def _step_s(case: Case) -> float:
 
 def measured_s(case: Case, skin: Skin, way: str) -> Latencies:
     """Times in s from a switch to the controller's input over :data:`INSTANTS` touches, by ``uart`` or ``pin``."""
-    key = f"{kept.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
-    found: list[float] = kept.kept("latencies", key, lambda: _measured(case, skin, way))
+    key = f"{result_cache.made_by(__name__, skin)} {way} {dataclasses.asdict(case.usb)} {case.control.period_s}"
+    found: list[float] = result_cache.cached("latencies", key, lambda: _measured(case, skin, way))
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.latency import AROUND_S, latency_s
-from contactfpga_sim.apps import kept
+from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.report import UNLIMITED
 from contactfpga_sim.lab.arm.run import run
@@ -48,8 +48,8 @@ class SweepPoint:
 
 def work(task: SweepTask) -> dict[str, float]:
     """Fields of the task's :class:`SweepPoint`, cached by code."""
-    key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
-    return kept.kept("arm", key, lambda: dataclasses.asdict(_point(task)))
+    key = f"{result_cache.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
+    return result_cache.cached("arm", key, lambda: dataclasses.asdict(_point(task)))
 
 
 def sweep(

@@ -15,7 +15,7 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import errors, kept, size, stats
+from contactfpga_sim.apps import errors, result_cache, size, stats
 from contactfpga_sim.apps.errors import METRICS
 from contactfpga_sim.apps.stats import Interval
 from contactfpga_sim.lab.chart import times
@@ -140,7 +140,7 @@ def accuracy(task: Task, first: int) -> Found:
         scenes = _touches(task, first)
         return compared((errors.look(scene, scene.settled_s, task.skin, task.cover) for scene in scenes), task.skin)
 
-    return kept.kept("accuracy", _key(task, "accuracy", first), new)
+    return result_cache.cached("accuracy", _key(task, "accuracy", first), new)
 
 
 def timings(task: Task) -> list[Raw]:
@@ -158,7 +158,7 @@ def timing(task: Task, first: int) -> Raw:
     def new() -> Raw:
         return times.measured(_touches(task, first), task.skin, task.cover, first, task.checked)
 
-    return kept.kept("timing", _key(task, "timing", first), new)
+    return result_cache.cached("timing", _key(task, "timing", first), new)
 
 
 def _touches(task: Task, first: int) -> list[Scene]:
@@ -187,7 +187,7 @@ def _size(skin: Skin) -> sizes.Size:
 
 def _key(task: Task, kind: str, number: int) -> str:
     parts = (kind, number, task.count, task.seed, task.checked, task.family, task.cover)
-    return f"{kept.made_by(__name__, task.skin)} {' '.join(map(str, parts))}"
+    return f"{result_cache.made_by(__name__, task.skin)} {' '.join(map(str, parts))}"
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:

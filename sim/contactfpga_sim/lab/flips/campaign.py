@@ -14,7 +14,7 @@ from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import kept, size
+from contactfpga_sim.apps import result_cache, size
 from contactfpga_sim.apps.stats import drawn, wilson
 from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import FlipOutcome
@@ -83,12 +83,12 @@ def _block(design: str, memory: bool, block: int) -> list[FlipOutcome]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[FlipOutcome] = kept.kept("flips", _key(design, memory, block), new)
+    rows: list[FlipOutcome] = result_cache.cached("flips", _key(design, memory, block), new)
     return rows
 
 
 def _key(design: str, memory: bool, block: int) -> str:
-    return repr((kept.made_by(__name__, skin(design)), memory, block))
+    return repr((result_cache.made_by(__name__, skin(design)), memory, block))
 
 
 @functools.lru_cache(maxsize=len(DESIGNS))

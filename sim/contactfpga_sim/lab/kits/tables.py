@@ -17,7 +17,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
 from contactfpga.driver import health
-from contactfpga_hdl.board import build, placed
+from contactfpga_hdl.board import build, pnr_report
 from contactfpga_sim.apps import pool
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import Spread
@@ -44,7 +44,7 @@ PAPER_SHEET = ("flush, point force", 10.0, 1.0, 5.0)
 class KitFigures(NamedTuple):
     kit: Kit
     finger: Finger
-    built: tuple[placed.Report, ...]
+    built: tuple[pnr_report.Report, ...]
 
 
 def compute() -> list[KitFigures]:
@@ -58,7 +58,7 @@ def _figures(kit: Kit) -> KitFigures:
         return KitFigures(kit, finger, tuple(workers.map(functools.partial(_built, kit), SEEDS)))
 
 
-def _built(kit: Kit, seed: int) -> placed.Report:
+def _built(kit: Kit, seed: int) -> pnr_report.Report:
     with tempfile.TemporaryDirectory() as folder:
         return build.build(kit.skin, kit.board, Path(folder), seed)
 

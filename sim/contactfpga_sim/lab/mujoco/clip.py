@@ -9,7 +9,7 @@ import numpy as np
 
 import contactfpga
 from contactfpga.driver.pace import Pace
-from contactfpga.tools.view.simulated import ALL, SKINS, SimulatedSource
+from contactfpga.tools.view.robot_source import ALL, SKINS, SimulatedSource
 from contactfpga_sim.lab.writer import table_of
 
 ARM = contactfpga.examples() / "arm"
@@ -47,7 +47,7 @@ class Met:
 
 
 def meet(angle: float) -> list[Met]:
-    """The example's arm with reflex in each of :data:`contactfpga.tools.view.simulated.SKINS`, from this angle."""
+    """The example's arm with reflex in each of :data:`contactfpga.tools.view.robot_source.SKINS`, from this angle."""
     robots = SimulatedSource(ROBOT, SCENE, REFLEXES)
     robots.reflex, pace = REFLEX, paced(robots)
     robots.advance()

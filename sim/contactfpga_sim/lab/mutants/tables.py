@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from contactfpga.skin.several import Several
-from contactfpga_sim.apps import kept, pool
+from contactfpga_sim.apps import pool, result_cache
 from contactfpga_sim.lab import writer
 from contactfpga_sim.verify.mutants import campaign, proof
 from contactfpga_sim.verify.mutants.campaign import Result, chosen, examine
@@ -105,9 +105,9 @@ def _own_cache() -> Iterator[None]:
 def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
     design = chosen(name)[0]
     skins = design.skins if isinstance(design, Several) else (design,)
-    code = kept.made_by(campaign.__name__, *skins)
+    code = result_cache.made_by(campaign.__name__, *skins)
     key = f"{name}, {each} of {seed}, {long_s} s, {code}"
-    found = kept.kept(
+    found = result_cache.cached(
         "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]
     )
     return [Result(one["skin"], Mutant(**one["mutant"]), one["fate"]) for one in found]

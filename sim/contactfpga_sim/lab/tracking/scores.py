@@ -19,7 +19,7 @@ from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.apps import kept, pool, stats
+from contactfpga_sim.apps import pool, result_cache, stats
 from contactfpga_sim.lab.tracking import scenes
 from contactfpga_sim.lab.tracking.scenes import FrameTruth, Place, zones_of
 from contactfpga_sim.model.scenes.recordings import Recording
@@ -329,8 +329,8 @@ Scores = dict[str, Score]
 @functools.cache
 def of_family(family: str, rate_hz: float, count: int = SCENES, names: tuple[str, ...] = tuple(TRACKERS)) -> Scores:
     """Scores on random scenes, the same at every rate; cached."""
-    key = repr((kept.made_by(__name__), family, rate_hz, count, names))
-    found = kept.kept("tracking", key, lambda: _scored(family, rate_hz, count, names))
+    key = repr((result_cache.made_by(__name__), family, rate_hz, count, names))
+    found = result_cache.cached("tracking", key, lambda: _scored(family, rate_hz, count, names))
     return {name: Score(**one) for name, one in found.items()}
 
 

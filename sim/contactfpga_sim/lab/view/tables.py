@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from contactfpga.driver import driver
 from contactfpga.skin.sheet import Sheet
-from contactfpga.tools.view import opening, plot, replayed
+from contactfpga.tools.view import board_recording, opening, plot
 from contactfpga.tools.view.opening import ServedView, View
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.view import browser
@@ -77,7 +77,7 @@ def draw(images: Path) -> Path:
         with driver.open("sim://?scene=moving", record=file) as board:
             while board.clock() < PLOTTED_S:
                 board.next()
-        plot.draw(replayed.load(str(file)), path)
+        plot.draw(board_recording.load(str(file)), path)
     return path
 
 

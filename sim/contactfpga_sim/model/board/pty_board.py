@@ -73,7 +73,7 @@ class PtyBoard:
         """Number of times the full port was emptied."""
         self.failure: BaseException | None = None
         """Exception that ended the thread; None after :meth:`stop`."""
-        self._slip_told = False
+        self._slip_reported = False
         self._link = Path(link) if link else None
         try:
             if self._link:
@@ -132,11 +132,11 @@ class PtyBoard:
                 self._run()
             passed = time.monotonic() - started
             share = min(1.0, self.clock() / passed)
-            told = f"the board ran for {self.clock():.1f} s in {passed:.1f} s of real time ({share:.0%})"
+            ran = f"the board ran for {self.clock():.1f} s in {passed:.1f} s of real time ({share:.0%})"
         finally:
             self.stop()
         unread = f"; {self.dropped} times bytes were dropped that nobody had read" if self.dropped else ""
-        _say(f"ended: {told}{unread}")
+        _say(f"ended: {ran}{unread}")
         return 0
 
     def _run_guarded(self) -> None:
@@ -164,9 +164,9 @@ class PtyBoard:
                 looked_s = time.monotonic()
 
     def _report_slip(self, share: float) -> None:
-        if share > SLIP_LIMIT and not self._slip_told:
-            self._slip_told = True  # again and again would fill the terminal; the end sums it up
-            _say(slip_told(self.skins[0], share))
+        if share > SLIP_LIMIT and not self._slip_reported:
+            self._slip_reported = True  # again and again would fill the terminal; the end sums it up
+            _say(slip_warning(self.skins[0], share))
 
     def _listen(self, seconds: float) -> None:
         if select.select([self._master], [], [], seconds)[0]:
@@ -209,7 +209,7 @@ class PtyBoard:
                 signal.signal(number, handler)
 
 
-def slip_told(skin: Skin, share: float) -> str:
+def slip_warning(skin: Skin, share: float) -> str:
     """Warning that this share of real time slips."""
     held = 1 - share
     clock_hz = clock_that_holds(skin, held * skin.clock_hz)

@@ -62,9 +62,9 @@ class Reports:
     Between reports, cycle t checks the digit at t modulo a power of two; a difference makes a report due two cycles
     later."""
 
-    def __init__(self, facts: Facts, told: FaultHistory):
+    def __init__(self, facts: Facts, history: FaultHistory):
         self._facts = facts
-        self._told = told
+        self._history = history
         self._places = -(-facts.fault_bits // 7)
         self._period = 1 << math.ceil(math.log2(self._places + 2))
         self._since = 0
@@ -96,7 +96,7 @@ class Reports:
     def _sent(self, handed: Sequence[int] | None) -> list[int]:
         if handed is None:
             return [0] * self._places
-        words = (self._told.at(cycle + 1) for cycle in handed[: self._places])
+        words = (self._history.at(cycle + 1) for cycle in handed[: self._places])
         return [word >> 7 * place & 127 for place, word in enumerate(words)]
 
     def _differs(self, last: int) -> int | None:
@@ -104,7 +104,7 @@ class Reports:
             return None
         sent = self._sent(self._handed)
         found = []
-        for begin, end, word in self._told.between(self._since, last):
+        for begin, end, word in self._history.between(self._since, last):
             for place, digit in enumerate(_digits(word, self._facts.fault_bits), 1):
                 cycle = begin + (place - begin) % self._period
                 if digit != sent[place - 1] and cycle <= end:

@@ -44,7 +44,7 @@ class FaultyLines:
         rows, columns = np.asarray(facts.mask.all(axis=1)), np.asarray(facts.mask.all(axis=0))
         stuck = np.append(columns, [False] * (facts.column_lines - facts.columns))
         self._masked = {"rows": rows, "columns": columns, "stuck": stuck}
-        self._told = {name: np.zeros_like(masked) for name, masked in self._masked.items()}
+        self._reported = {name: np.zeros_like(masked) for name, masked in self._masked.items()}
 
     def check(
         self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
@@ -52,12 +52,12 @@ class FaultyLines:
         """Apply a check that found these of all rows, columns or stuck columns faulty, or that checked ``only`` one
         row. If it ``renews``, lines found good are no longer reported."""
         place = slice(None) if only is None else slice(only, only + 1)
-        told = self._told[lines]
-        kept = np.zeros_like(told) if renews else told
-        told[place] = ((found | kept) & ~self._masked[lines])[place]
+        reported = self._reported[lines]
+        kept = np.zeros_like(reported) if renews else reported
+        reported[place] = ((found | kept) & ~self._masked[lines])[place]
 
     @property
     def word(self) -> int:
         """Report word, from the lowest bit: rows, columns, stuck columns, guard column."""
-        bits = np.concatenate([self._told[name] for name in ("rows", "columns", "stuck")])
+        bits = np.concatenate([self._reported[name] for name in ("rows", "columns", "stuck")])
         return sum(1 << int(place) for place in np.flatnonzero(bits))

@@ -79,7 +79,7 @@ class State:
         return max(0, taken - 1 - late) // facts.clocks_per_us // 2**22
 
     def _stuck(self, cycle: int) -> int:
-        index = bisect.bisect_right(self._scanned, cycle, key=lambda scan: scan.told)
+        index = bisect.bisect_right(self._scanned, cycle, key=lambda scan: scan.reported)
         return self._scanned[index - 1].stuck if index else 0
 
 

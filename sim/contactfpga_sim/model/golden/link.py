@@ -82,7 +82,7 @@ class SharedLine:
 class Link:
     """Order of packets on the wire. Time only advances.
 
-    ``told``: the scan's fault words, known up to the cycle of each :meth:`advance`, at the end of :meth:`finish`.
+    ``faults``: the scan's fault words, known up to the cycle of each :meth:`advance`, at the end of :meth:`finish`.
     ``units``: (cycle from which it waits, packet) of each sweep, replaced by the next. ``line``: shared with other
     links; by default its own.
     """
@@ -91,7 +91,7 @@ class Link:
         self,
         facts: Facts,
         state: State,
-        told: FaultHistory | None = None,
+        faults: FaultHistory | None = None,
         units: Sequence[tuple[int, bytes]] = (),
         line: SharedLine | None = None,
     ):
@@ -105,7 +105,7 @@ class Link:
         self._blank: list[tuple[int, int, int]] = []
         """Hellos without their state: position in ``bytes``, cycle taken, frames sent by then."""
         self._frame: tuple[int, bytes] | None = None
-        self._reports = Reports(facts, told or FaultHistory()) if facts.fault_bits else None
+        self._reports = Reports(facts, faults or FaultHistory()) if facts.fault_bits else None
         self._reported: list[int] = []
         self._after_report = -1
         self._slot: tuple[int, bytes] | None = None

@@ -79,19 +79,19 @@ def _play(
     heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands), known.closing)
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
-    told = FaultHistory()
+    faults = FaultHistory()
     pressed = units.play(known, timeline, heard.requests, cycles)
-    link = Link(known, State(known, frames, heard), told, pressed.packets, line)
+    link = Link(known, State(known, frames, heard), faults, pressed.packets, line)
     half_second = 2**19 * known.clocks_per_us
     timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
     packer = Packer(known, link, Divider(known, trace) if known.divided else Queue())
-    stages = Pipeline(known, trace, packer, frames, told, link)
+    stages = Pipeline(known, trace, packer, frames, faults, link)
     rule: scan.ScanRule = scans.find(skin.scan).load_golden()
     scanned = rule.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
-    faulty = _fault(frames, stages.told, scanned.stuck)
+    faulty = _fault(frames, stages.fault_changes, scanned.stuck)
     touched = _either(scanned.contact, pressed.over)
     unwatched = [(0, 1), *((cycle, 1 - level) for cycle, level in pressed.armed)] if skin.units else []
     if skin.fail_safe:
@@ -113,7 +113,7 @@ class Pipeline:
         self._trace = trace
         self._packer = packer
         self._scanned = scanned
-        self.told: scan.Changes = []
+        self.fault_changes: scan.Changes = []
         """(cycle, faults) of every change of reported faulty lines."""
         self.well: list[int] = []
         """Cycles in which a frame was packed or an untouched sheet checked."""
@@ -122,8 +122,8 @@ class Pipeline:
         self._late = facts.columns + 3 if facts.debounced else 0  # a driven row; the others pass
 
     def tell(self, cycle: int, faults: int) -> None:
-        if faults != (self.told[-1][1] if self.told else 0):
-            self.told.append((cycle, faults))
+        if faults != (self.fault_changes[-1][1] if self.fault_changes else 0):
+            self.fault_changes.append((cycle, faults))
             self._reported.change(cycle, faults)
 
     def watch(self, cycle: int) -> None:
@@ -267,8 +267,8 @@ def _word(cells: np.ndarray) -> int:
 TICK_US = 1000
 
 
-def _fault(scanned: Iterable[scan.Scan], told: scan.Changes, stuck: scan.Changes) -> scan.Changes:
-    sources = [(one.told, int(one.fault)) for one in scanned], [(cycle, int(word > 0)) for cycle, word in told], stuck
+def _fault(scanned: Iterable[scan.Scan], faults: scan.Changes, stuck: scan.Changes) -> scan.Changes:
+    sources = [(one.reported, int(one.fault)) for one in scanned], [(at, int(word > 0)) for at, word in faults], stuck
     marks = [(cycle, source, level) for source, changes in enumerate(sources) for cycle, level in changes]
     known, levels = [0, 0, 0], []
     for cycle, source, level in sorted(marks):

@@ -27,10 +27,10 @@ class Raster(ScanRule):
         counted = debounced(
             np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
         )
-        told = checks(facts, play.timeline, frames, play.requests)
-        for change in (change for frame in told for change in frame):
+        reports = checks(facts, play.timeline, frames, play.requests)
+        for change in (change for frame in reports for change in frame):
             play.stages.tell(*change)
-        for one, cells, changes in zip(scanned, counted, told, strict=True):
+        for one, cells, changes in zip(scanned, counted, reports, strict=True):
             play.stages.frame(dataclasses.replace(one, faults=changes[-1][1] if changes else 0), cells)
         driven = []
         for slot in range(frames * facts.row_lines):
@@ -76,7 +76,7 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
                 requested=any(early <= request.cycle < late for request in requests),
                 heard=last_number(requests, late) % 8,
-                told=strobe(facts, slots[-1]) + 2,
+                reported=strobe(facts, slots[-1]) + 2,
             )
         )
     return result
@@ -135,20 +135,20 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
     """By frame (cycle, word) of each check. A frame sampled early has no row checks."""
     if not facts.skin.guard:
         return [[]] * count
-    told, result = FaultyLines(facts), []
+    faulty, result = FaultyLines(facts), []
     for frame in range(count):
         changes, renews = [], _renews(facts, frame)
         slots = row_slots(facts, frame)
         ahead = early_clocks(facts, requests, _asked_before(facts, slots[0]))
-        told.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
-        changes.append((strobe(facts, slots[0] - 1) + 1, told.word))
+        faulty.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
+        changes.append((strobe(facts, slots[0] - 1) + 1, faulty.word))
         for row, slot in enumerate(slots):
             whole = _read(facts, timeline, slot)[-1]
             if not ahead:
-                told.check("rows", np.full(facts.rows, not whole), renews, row)
+                faulty.check("rows", np.full(facts.rows, not whole), renews, row)
             if slot == slots[-1]:
-                told.check("stuck", _stuck(facts, timeline, frame), renews)
-            changes.append((strobe(facts, slot) + 1, told.word))
+                faulty.check("stuck", _stuck(facts, timeline, frame), renews)
+            changes.append((strobe(facts, slot) + 1, faulty.word))
         result.append(changes)
     return result
 

@@ -88,7 +88,7 @@ class ReversalScanModel:
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
-        self._told = FaultHistory()
+        self._faults = FaultHistory()
         self._flag = False  # the last frame's for faults
         self._held = StuckColumns(facts, play.timeline)
         self.checks = GuardChecks(facts, play.timeline, self._held) if facts.skin.guard else None
@@ -112,7 +112,7 @@ class ReversalScanModel:
             time_us=begun // self._facts.clocks_per_us,
             requested=any(one.cycle < begun for one in self._waiting()),
             heard=last_number(self._requests, begun) % 8,
-            told=begun + 3,
+            reported=begun + 3,
             faults=self._word,
         )
         self.begun.append(begun)
@@ -175,7 +175,7 @@ class ReversalScanModel:
         self._tell(sample + 3)
 
     def _tell(self, cycle: int) -> None:
-        self._told.change(cycle, self._word)
+        self._faults.change(cycle, self._word)
         self._stages.tell(cycle, self._word)
 
     def _fault_change(self, begin: int, end: int) -> int:
@@ -187,7 +187,7 @@ class ReversalScanModel:
         return next((cycle for cycle in sorted(changes) if cycle < end and self._known(cycle - 1) != self._flag), end)
 
     def _known(self, cycle: int) -> bool:
-        return bool(self._held.at(cycle)[: self._facts.columns].any() or self._told.at(cycle))
+        return bool(self._held.at(cycle)[: self._facts.columns].any() or self._faults.at(cycle))
 
     @property
     def _word(self) -> int:

@@ -181,14 +181,14 @@ class GuardChecks:
         self._retry = guard.RETRY_US * facts.clocks_per_us
         self._retries = 0  # up to the last check of rows
         self._renews = False
-        self._told = FaultyLines(facts)
+        self._faulty = FaultyLines(facts)
         self._of_rows = False
         self._last = 0  # the cycle in which the last check started
 
     @property
     def word(self) -> int:
         """Fault word from three cycles after the last check's sample on."""
-        return self._told.word
+        return self._faulty.word
 
     @property
     def asked(self) -> int:
@@ -221,19 +221,19 @@ class GuardChecks:
         facts = self._facts
         answers = closed(facts, self._timeline, sample)[: facts.rows, -1] & ~self._held.undriven(sample)[-1]
         pressed = (np.arange(facts.column_lines) == facts.columns) & self._guard_reads(sample)
-        if not pressed[-1] and not self._guard_told:
-            self._told.check("rows", ~answers, self._renews)
-        self._told.check("stuck", pressed | self._held.at(sample + 2), self._renews)
+        if not pressed[-1] and not self._guard_reported:
+            self._faulty.check("rows", ~answers, self._renews)
+        self._faulty.check("stuck", pressed | self._held.at(sample + 2), self._renews)
         retries = (sample + 2) // self._retry
         self._renews, self._retries = retries != self._retries, retries
 
     def _check_columns(self, sample: int) -> None:
         facts = self._facts
         answers = (closed(facts, self._timeline, sample)[-1] | self._stuck(sample))[: facts.columns]
-        self._told.check("columns", ~answers, self._renews)
+        self._faulty.check("columns", ~answers, self._renews)
 
     @property
-    def _guard_told(self) -> bool:
+    def _guard_reported(self) -> bool:
         return bool(self.word >> self._facts.rows + 2 * self._facts.columns)
 
     def _guard_reads(self, sample: int) -> bool:

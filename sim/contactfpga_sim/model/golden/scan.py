@@ -31,7 +31,7 @@ class Scan:
     """Whether a request arrived since the previous scan began."""
     heard: int
     """Lowest three bits of the last request's number; 0 without any."""
-    told: int
+    reported: int
     """Cycle from which a hello reports the stuck columns."""
     faults: int = 0
     """:attr:`contactfpga_sim.model.golden.guard.FaultyLines.word` at the end."""

@@ -185,10 +185,10 @@ def play(facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: 
             total = sum(weight * deviation for weight, deviation in zip(weights, deviations, strict=True))
             hits[SET_SUM_THRESHOLD, place] = settings.reached(SET_SUM_THRESHOLD, place, done + 3 + place, abs(total))
             _note(found.over, done + 4 + place, hits)
-        told = done + -(-rule.bits // 7) + 6
-        over, armed = (bool(_level(changes, told)) for changes in (found.over, found.armed))
+        reported = done + -(-rule.bits // 7) + 6
+        over, armed = (bool(_level(changes, reported)) for changes in (found.over, found.armed))
         packet = _packet(facts, rule.bits, readings, sweep[0].time_us, sequence, over, armed)
-        found.packets.append((told + 1, packet))
+        found.packets.append((reported + 1, packet))
     return found
 
 

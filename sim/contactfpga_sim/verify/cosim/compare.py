@@ -32,8 +32,8 @@ class Mismatch(ContactFPGAError, AssertionError):
     def _tell(self, event: Event | None) -> str:
         if event is None:
             return "nothing"
-        told = describe(self.boundary, event)
-        return told if event[0] == self.cycle else f"nothing (next is {told} at cycle {event[0]})"
+        described = describe(self.boundary, event)
+        return described if event[0] == self.cycle else f"nothing (next is {described} at cycle {event[0]})"
 
 
 def compare(expected: Trace, got: Trace) -> int:

@@ -152,10 +152,10 @@ def main() -> int:
     parser.add_argument(
         "--frames", type=numbers.whole(1, 10**9), default=500, help="for each board (default: %(default)s)"
     )
-    told = "one of the default boards; whole numbers that follow each other draw all"
-    parser.add_argument("--one", type=int, metavar="NUMBER", help=told)
-    told = "a .npz file with frames named `pressed`, or a folder of such files"
-    parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
+    words = "one of the default boards; whole numbers that follow each other draw all"
+    parser.add_argument("--one", type=int, metavar="NUMBER", help=words)
+    words = "a .npz file with frames named `pressed`, or a folder of such files"
+    parser.add_argument("--recordings", type=Path, metavar="PATH", help=words)
     args = parser.parse_args()
     if args.skin and not args.board:
         parser.error("--skin needs the board that it is for")

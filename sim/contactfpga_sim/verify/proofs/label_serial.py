@@ -12,7 +12,7 @@ from contactfpga_hdl.payloads import moments_layout, zone_layout
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase, plant
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.label import rows_into, skin_of
-from contactfpga_sim.verify.proofs.marked import Marks, marked_skin
+from contactfpga_sim.verify.proofs.marks import Marks, marked_skin
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.zones import (
     OpenRow,

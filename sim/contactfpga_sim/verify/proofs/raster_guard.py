@@ -26,7 +26,7 @@ def skin_of(diodes: Diodes) -> Skin:
     )  # fmt: skip
 
 
-def lines_told(proof: Proof, diodes: Diodes) -> None:
+def silent_lines(proof: Proof, diodes: Diodes) -> None:
     """Free: the columns, and when rows are taken.
 
     Claimed: a row that did not read the guard column in its slot is reported one clock after its strobe, likewise a
@@ -46,23 +46,23 @@ def lines_told(proof: Proof, diodes: Diodes) -> None:
     slot, line = _slots(m, dut)
     strobe = slot == dut.derived.settle_clocks + 1
     for row in range(ROWS - 1):
-        _told(proof, inside, strobe & (line == row), silent[COLUMNS], dut.faults.rows[row])
+        _report(proof, inside, strobe & (line == row), silent[COLUMNS], dut.faults.rows[row])
     proof.claim(~dut.faults.rows[ROWS - 1])
     for column in range(COLUMNS):
-        _told(proof, inside, strobe & (line == ROWS), silent[column], dut.faults.columns[column])
+        _report(proof, inside, strobe & (line == ROWS), silent[column], dut.faults.columns[column])
     with m.If(proof.before(proof.before(strobe & (line == ROWS - 1)))):
         proof.claim(dut.tag.fault | ~proof.before((dut.faults.rows | dut.faults.columns).any()))
     _lemmas(proof, inside, dut, slot, line)
     level_lemmas(proof, inside, columns, released)
 
 
-def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Value) -> None:
+def _report(proof: Proof, inside: Inside, checked: Value, silent: Value, reported: Value) -> None:
     ever = Signal(name="ever_silent")
     with proof.m.If(checked & silent):
         proof.m.d.sync += ever.eq(1)
-    proof.claim(told | ~proof.before(checked & silent))
-    proof.claim(told | ~proof.before(told) | proof.before(checked & inside["told.renewing"]))
-    proof.claim(ever | ~told)
+    proof.claim(reported | ~proof.before(checked & silent))
+    proof.claim(reported | ~proof.before(reported) | proof.before(checked & inside["line_faults.renewing"]))
+    proof.claim(ever | ~reported)
 
 
 def _slots(m, dut: Scanner) -> tuple[Signal, Signal]:
@@ -91,20 +91,20 @@ def _lemmas(proof: Proof, inside: Inside, dut: Scanner, slot: Signal, line: Sign
 
 
 _BUGS = (
-    Bug("the next row is told", LineFaults, "faults.rows", lambda rows, _: rows.rotate_left(1)),
-    Bug("a row is told once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
-    Bug("columns that answer are told", LineFaults, "faults.columns",
+    Bug("the next row is reported", LineFaults, "faults.rows", lambda rows, _: rows.rotate_left(1)),
+    Bug("a row is reported once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
+    Bug("columns that answer are reported", LineFaults, "faults.columns",
         lambda columns, inside: columns ^ inside.component.checks_columns.replicate(COLUMNS)),
-    Bug("one column is told for all", LineFaults, "faults.columns",
+    Bug("one column is reported for all", LineFaults, "faults.columns",
         lambda columns, _: columns.any().replicate(COLUMNS)),
-    Bug("a masked row is told", LineFaults, "faults.rows",
+    Bug("a masked row is reported", LineFaults, "faults.rows",
         lambda rows, inside: rows | inside.component.rows & inside.component.checks_rows),
     Bug("columns are checked in rows' slots", Scanner, "checks_columns", lambda _, inside: inside["of_row"]),
     Bug("the tag does not say so", Scanner, "at_end", lambda *_: 0),
 )  # fmt: skip
 CASES = (
     ProofCase(
-        "silent lines are told", "3x2, guard lines, col2row", partial(lines_told, diodes="col2row"), 2, _BUGS, 44
+        "silent lines are reported", "3x2, guard lines, col2row", partial(silent_lines, diodes="col2row"), 2, _BUGS, 44
     ),
-    ProofCase("silent lines are told", "3x2, guard lines, row2col", partial(lines_told, diodes="row2col"), 2),
+    ProofCase("silent lines are reported", "3x2, guard lines, row2col", partial(silent_lines, diodes="row2col"), 2),
 )

@@ -59,7 +59,7 @@ def reports_are_true(proof: Proof, skin: Skin) -> None:
     with m.If(reports & dut.bytes.valid & (index == length + CHECK_BYTES)):
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     proof.claim(~(reports & taken))
-    _untold(proof, dut, inside, reports, take, last, right[place])
+    _unreported(proof, dut, inside, reports, take, last, right[place])
     _order(proof, inside, take)
     _lemmas(proof, inside, reports, index, place, expected, last, empty)
 
@@ -81,7 +81,7 @@ def _free_inputs(proof: Proof, dut: Link) -> None:
     m.d.comb += dut.bytes.ready.eq(proof.free(1, "bytes_ready"))
 
 
-def _untold(proof: Proof, dut: Link, inside: Inside, reports, take, last, right) -> None:
+def _unreported(proof: Proof, dut: Link, inside: Inside, reports, take, last, right) -> None:
     m = proof.m
     word = Value.cast(dut.faults)
     stood = Signal(range(_ROUND + 3), name="stood")  # clocks in which no report was on the wire and the word the same

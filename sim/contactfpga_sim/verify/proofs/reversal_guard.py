@@ -91,8 +91,8 @@ def whole(proof: Proof, **changes: Any) -> None:
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     lines, inside, m = Lines(sheet), sheet.inside, proof.m
-    told = sheet.dut.faults
-    proof.claim(~lines.of_row(told.rows) & ~lines.of_column(told.columns))
+    faults = sheet.dut.faults
+    proof.claim(~lines.of_row(faults.rows) & ~lines.of_column(faults.columns))
     owed, last = Signal(), Signal(init=1)  # a check, since a frame with a row began; the last one was of the rows
     checked, of_rows = inside["cycle.checks_due"], inside["checks.of_rows"]
     with m.If(sheet.begins & sheet.wanted.any()):
@@ -115,21 +115,21 @@ def silent(proof: Proof, **changes: Any) -> None:
     that renews. Three clocks after a frame began its flag is set if a line was reported a clock before.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
-    told, skin, begun = sheet.dut.faults, sheet.skin, proof.before(proof.before(sheet.begins))
+    faults, skin, begun = sheet.dut.faults, sheet.skin, proof.before(proof.before(sheet.begins))
     y, x = proof.chosen(range(skin.rows), "y"), proof.chosen(range(skin.columns), "x")
     proof.given((y < skin.rows) & (x < skin.columns))
     of_columns = proof.before(proof.before(sheet.selected[-1]) & ~sheet.selected[-1])  # and their sample is known
     of_rows = proof.before(_inverted(sheet)) & ~_inverted(sheet)
-    guard = sheet.pressed_2[-1] | told.stuck[-1]
+    guard = sheet.pressed_2[-1] | faults.stuck[-1]
     pressed, read = sheet.pressed_2.bit_select(x, 1), sheet.read_2.bit_select(y, 1)
-    renews = sheet.inside["checks.told.renewing"]
+    renews = sheet.inside["checks.line_faults.renewing"]
     for line, checked, answers in (
-        (told.columns.bit_select(x, 1), of_columns, pressed),
-        (told.rows.bit_select(y, 1), of_rows, read | guard),
+        (faults.columns.bit_select(x, 1), of_columns, pressed),
+        (faults.rows.bit_select(y, 1), of_rows, read | guard),
     ):
         proof.claim(line | ~proof.before(checked & ~answers))
         proof.claim(line | ~proof.before(line) | proof.before(checked & renews))
-    proof.claim(~proof.before(begun) | sheet.dut.tag.fault | ~proof.before(told.as_value().any()))
+    proof.claim(~proof.before(begun) | sheet.dut.tag.fault | ~proof.before(faults.as_value().any()))
     pin_lemmas(sheet)
     synchronizer_lemmas(sheet)
     _turn_lemmas(sheet)
@@ -150,7 +150,7 @@ def _turn_lemmas(sheet: Sheet) -> None:
 
 
 def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> None:
-    proof, state, clock, inside, told = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
+    proof, state, clock, inside, faults = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
     spared = checks - settle
@@ -158,7 +158,7 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
         inside["cycle.checks_due"],
         inside["checks.of_rows"],
         inside["cycle.selects"],
-        told.stuck[-1],
+        faults.stuck[-1],
     )
     _turn_lemmas(sheet)
     proof.lemma(~inside["precharge.guard_stuck"] | blind)
@@ -193,16 +193,16 @@ _WHOLE_BUGS = (
         lambda checked, inside: Mux(inside["cycle_state"] == SELECT, 0, checked)),
     Bug("rows are read too early", ReversalCycle, "clock",
         lambda clock, inside: clock + (inside["check_starts"] & inside["of_rows"])),
-    Bug("told by a stuck guard column", Checks, "checks_rows",
+    Bug("reported by a stuck guard column", Checks, "checks_rows",
         lambda _, inside: inside["of_guard"].replicate(len(inside["checks_rows"]))),
-    Bug("columns are told by the rows' check", Checks, "checks_columns",
+    Bug("columns are reported by the rows' check", Checks, "checks_columns",
         lambda _, inside: inside["checked"]),
     Bug("rows only", Checks, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
 )  # fmt: skip
 _SILENT_BUGS = (
-    Bug("no row is told", LineFaults, "faults.rows", lambda *_: 0),
-    Bug("no column is told", LineFaults, "faults.columns", lambda *_: 0),
-    Bug("a row is told once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
+    Bug("no row is reported", LineFaults, "faults.rows", lambda *_: 0),
+    Bug("no column is reported", LineFaults, "faults.columns", lambda *_: 0),
+    Bug("a row is reported once", LineFaults, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
     Bug("columns are never checked", Checks, "checks_columns", lambda *_: 0),
     Bug("the flag does not say so", ReversalScanner, "at_begin", lambda *_: 0),
 )  # fmt: skip
@@ -210,11 +210,11 @@ CASES = (
     ProofCase("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
     ProofCase("pins never meet", "2x1, guard lines, row2col, shortest times",
               partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
-    ProofCase("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
-    ProofCase("whole lines are not told", "2x1, row2col, shortest times, debounced",
+    ProofCase("whole lines are not reported", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
+    ProofCase("whole lines are not reported", "2x1, row2col, shortest times, debounced",
          partial(whole, rows=2, columns=1, diodes="row2col", debounce="sym_defer_pk", **SHORT), 2, _WHOLE_BUGS, 40),
-    ProofCase("silent lines are told", "3x2, reversal", partial(silent, rows=3, columns=2, project_us=5), 4,
+    ProofCase("silent lines are reported", "3x2, reversal", partial(silent, rows=3, columns=2, project_us=5), 4,
               _SILENT_BUGS, 60),
-    ProofCase("silent lines are told", "2x1, reversal, row2col, shortest times",
+    ProofCase("silent lines are reported", "2x1, reversal, row2col, shortest times",
               partial(silent, rows=2, columns=1, diodes="row2col", **SHORT), 4),
 )  # fmt: skip

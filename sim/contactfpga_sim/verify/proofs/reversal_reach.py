@@ -48,18 +48,18 @@ class Report:
         m, rows = sheet.proof.m, sheet.skin.rows
         self.unread = Signal(rows)  # rows of the frame that were not sampled yet
         self.due = Signal()  # the switch was closed from two clocks before the frame until now, or its row's sample
-        self.told = Signal()
+        self.reported = Signal()
         left = self.unread & ~Mux(spec.ended, sheet.proof.before(sheet.selected), 0)
         with m.If(sheet.begins):
             since = switch.closed & switch.closed_1 & switch.closed_2
-            m.d.sync += [self.unread.eq(sheet.wanted), self.due.eq(since), self.told.eq(0)]
+            m.d.sync += [self.unread.eq(sheet.wanted), self.due.eq(since), self.reported.eq(0)]
         with m.Else():
             stays = switch.closed | (left & switch.row == 0)
             m.d.sync += [self.unread.eq(left), self.due.eq(self.due & stays)]
         self.row_offered = sheet.dut.rows.valid & sheet.dut.alone & (spec.lowest == switch.row)
         self.offered = self.row_offered & switch.of_column(sheet.dut.rows.payload.cells)
         with m.If(spec.taken & self.offered):
-            m.d.sync += self.told.eq(1)
+            m.d.sync += self.reported.eq(1)
 
 
 def closed(proof: Proof, **changes: Any) -> None:
@@ -74,7 +74,7 @@ def closed(proof: Proof, **changes: Any) -> None:
     report = Report(sheet, spec, switch)
     proof.claim(~(sheet.begins & switch.closed_2) | (sheet.wanted & switch.row).any())
     proof.claim(~(report.row_offered & report.due) | report.offered)
-    proof.claim(~(spec.taken & sheet.dut.rows.payload.last & report.due) | report.told | report.offered)
+    proof.claim(~(spec.taken & sheet.dut.rows.payload.last & report.due) | report.reported | report.offered)
     keep_frames(sheet, spec)
     closed_lemmas(sheet, spec, switch, report)
 
@@ -91,7 +91,7 @@ def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) ->
     with proof.m.If(state == LISTEN):
         proof.lemma((sheet.clock < 2) | (~switch.closed_1 | (sheet.read_1 & row).any()) & ~pressed_1)
         proof.lemma((sheet.clock < 3) | (~switch.closed_2 | (sheet.read_2 & row).any()) & ~pressed_2)
-    proof.lemma(~(spec.underway & report.due) | report.told | (spec.left & row).any())
+    proof.lemma(~(spec.underway & report.due) | report.reported | (spec.left & row).any())
     with proof.m.If(report.due & (now == row)):
         proof.lemma((due != 1) | pressed_1)
         proof.lemma(~((due == 2) | waits_to_be_taken(sheet)) | switch.of_column(spec.sample))

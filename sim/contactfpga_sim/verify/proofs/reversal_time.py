@@ -174,7 +174,7 @@ def _age_lemmas(
     proof, rests, clock = sheet.proof, sheet.inside["cycle.rests"], sheet.clock
     listened = sheet.dut.derived.project_clocks + 2
     proof.lemma(bound <= prompt.longest)
-    proof.lemma(~report.due | report.told | underway)
+    proof.lemma(~report.due | report.reported | underway)
     proof.lemma((age == 0) | switch.closed_1)
     proof.lemma((age <= 1) | switch.closed_2)
     with proof.m.If(since == 0):
@@ -182,7 +182,7 @@ def _age_lemmas(
         proof.lemma(rests | (age <= clock) | (clock == listened))
         proof.lemma((packing == 0) | (age + packing <= PACKED + 3))
         proof.lemma(age <= max(listened, PACKED + 3))
-    with proof.m.Elif(report.due & ~report.told):
+    with proof.m.Elif(report.due & ~report.reported):
         proof.lemma(age <= since + prompt.longest + 1)
     with proof.m.Else():
         proof.lemma(age <= since + 1)
@@ -200,7 +200,7 @@ def rises(proof: Proof, **changes: Any) -> None:
     keep_frames(sheet, spec)
 
 
-def faults_are_told(proof: Proof, **changes: Any) -> None:
+def fault_reports(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and when rows are taken. Assumed: no frame is packed before its last row is taken.
 
     Claimed: while the sheet rests, nothing reads touched and the last frame is packed, its flag differs from whether a
@@ -247,7 +247,7 @@ _CONTACT_BUGS = (
     Bug("for one clock", Contact, "contact", lambda contact, inside: contact & ~inside["contact"]),
     Bug("of row 0 alone", ReversalScanner, "wakes", lambda _, inside: _wakes_alone(inside)),
 )  # fmt: skip
-_TOLD_BUGS = (
+_REPORT_BUGS = (
     Bug("with the next frame", ReversalScanner, "changed", lambda *_: 0),
     Bug("of column 0 alone", ReversalScanner, "stuck", lambda _, inside: inside.part("precharge").held[0]),
     Bug("a frame late", ReversalScanner, "begun", lambda _, inside: inside["rows__valid"]),
@@ -267,5 +267,5 @@ CASES = (
     ProofCase("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     ProofCase("contact in three clocks", "3x2, shortest times, row2col",
               partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
-    ProofCase("faults are told at once", "3x2", partial(faults_are_told, rows=3, columns=2), 4, _TOLD_BUGS, 100),
+    ProofCase("faults are reported at once", "3x2", partial(fault_reports, rows=3, columns=2), 4, _REPORT_BUGS, 100),
 )  # fmt: skip

@@ -16,7 +16,7 @@ LISTEN, TEST, CHARGE, GAP, SELECT = range(5)  # in the order in which the source
 REST, IN_GAP, DISCHARGE, LET_GO, DRIVE, SEE = range(6)
 
 
-class Tested:
+class SelfTestScan:
     """The scan with a self-test, and its pins."""
 
     def __init__(self, proof: Proof, **changes: Any):
@@ -56,26 +56,26 @@ def one_line(proof: Proof, **changes: Any) -> None:
     selecting level, for the projection time, or one line alone is driven to the released level, for the settle time; a
     clock without a driven line is between.
     """
-    tested = Tested(proof, **changes)
-    m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
+    scan = SelfTestScan(proof, **changes)
+    m, sheet, skin = proof.m, scan.sheet, scan.sheet.skin
     selected, derived = sheet.selected, sheet.dut.derived
-    apart(proof, tested.released[skin.rows :], selected)
-    proof.claim(~tested.discharges | (tested.released == 0))
-    proof.claim((selected & (selected - 1) == 0) | tested.discharges)
+    apart(proof, scan.released[skin.rows :], selected)
+    proof.claim(~scan.discharges | (scan.released == 0))
+    proof.claim((selected & (selected - 1) == 0) | scan.discharges)
     alone = Signal()
-    m.d.comb += alone.eq(tested.released.any())
-    with m.If(tested.tests_1):
-        proof.claim(tested.released & (tested.released - 1) == 0)
-        proof.claim(~alone | (tested.driven == tested.released))
-        proof.claim(~(alone & proof.before(tested.discharges)))
+    m.d.comb += alone.eq(scan.released.any())
+    with m.If(scan.tests_1):
+        proof.claim(scan.released & (scan.released - 1) == 0)
+        proof.claim(~alone | (scan.driven == scan.released))
+        proof.claim(~(alone & proof.before(scan.discharges)))
     discharged, driven = Signal(range(derived.project_clocks + 2)), Signal(range(derived.settle_clocks + 2))
     m.d.sync += [
-        discharged.eq(Mux(tested.discharges, discharged + 1, 0)),
-        driven.eq(Mux(tested.tests_1 & alone, driven + 1, 0)),
+        discharged.eq(Mux(scan.discharges, discharged + 1, 0)),
+        driven.eq(Mux(scan.tests_1 & alone, driven + 1, 0)),
     ]
-    proof.claim(~tested.discharges | (discharged < derived.project_clocks))
-    proof.claim(~(tested.tests_1 & alone) | (driven < derived.settle_clocks))
-    pin_lemmas(tested)
+    proof.claim(~scan.discharges | (discharged < derived.project_clocks))
+    proof.claim(~(scan.tests_1 & alone) | (driven < derived.settle_clocks))
+    pin_lemmas(scan)
     slot, clock = sheet.inside["test.slot_state"], sheet.inside["test.clock"]
     project = derived.project_clocks
     after = Mux(slot == LET_GO, project - 1, Mux((slot == DRIVE) & (clock == 0), project, 0))
@@ -84,8 +84,8 @@ def one_line(proof: Proof, **changes: Any) -> None:
     proof.lemma((driven == 0) | (slot == DRIVE) & (driven < clock) | in_see)
 
 
-def pin_lemmas(tested: Tested) -> None:
-    proof, sheet, inside = tested.proof, tested.sheet, tested.sheet.inside
+def pin_lemmas(scan: SelfTestScan) -> None:
+    proof, sheet, inside = scan.proof, scan.sheet, scan.sheet.inside
     skin, derived, state, clock = sheet.skin, sheet.dut.derived, sheet.state, sheet.clock
     slot, slot_clock, before = inside["test.slot_state"], inside["test.clock"], proof.before(state, init=LISTEN)
     slot_before = proof.before(slot, init=REST)
@@ -94,7 +94,7 @@ def pin_lemmas(tested: Tested) -> None:
     proof.lemma(slot <= SEE)
     proof.lemma((state == TEST) == (slot != REST))
     every, discharged = (1 << skin.rows) - 1, slot_before == DISCHARGE
-    alone = Mux(slot_before == DRIVE, proof.before(tested.line()), 0)
+    alone = Mux(slot_before == DRIVE, proof.before(scan.line()), 0)
     selected = Mux(selects, (Const(1, skin.rows) << inside["cycle.y"])[: skin.rows], 0)
     proof.lemma(inside["cycle.selected"] == Mux(discharged, every, selected))
     charged = Mux(discharged, (1 << skin.columns) - 1, alone[skin.rows :])
@@ -120,45 +120,45 @@ def pin_lemmas(tested: Tested) -> None:
 def shown(proof: Proof, **changes: Any) -> None:
     """Free as in :func:`one_line`. Claimed: a sent slot has the pins' levels in the last clock in which its line was
     driven, and stays until it is taken; numbers are in order."""
-    tested = Tested(proof, **changes)
-    m, sheet, skin = proof.m, tested.sheet, tested.sheet.skin
+    scan = SelfTestScan(proof, **changes)
+    m, sheet, skin = proof.m, scan.sheet, scan.sheet.skin
     slots, number = sheet.dut.slots, sheet.inside["test.number"]
     read, released = sheet.read_2[: skin.rows], ~sheet.pressed_2
     payload = slots.payload.as_value()
     expected = Cat(read, released)
-    judged = proof.before(tested.ends)
+    judged = proof.before(scan.ends)
     alone_1 = proof.before(proof.before(sheet.inside["test.alone"]))
     alone_2 = proof.before(alone_1)
     alone_3 = proof.before(alone_2)
-    lines = payload[-len(tested.driven) :]
+    lines = payload[-len(scan.driven) :]
     with m.If(judged):
         proof.claim(lines == proof.before(expected))
-        proof.claim(alone_3 == proof.before(tested.line()))
+        proof.claim(alone_3 == proof.before(scan.line()))
         proof.claim(alone_2 == 0)
     with m.If(proof.before(slots.valid & ~slots.ready)):
         proof.claim(slots.valid & (payload == proof.before(payload)))
     lasts = proof.before(number)
     proof.claim((number == lasts) | (number == lasts + 1) | (number == 0))
-    pin_lemmas(tested)
+    pin_lemmas(scan)
     synchronizer_lemmas(sheet)
-    _shown_lemmas(tested, alone_1, alone_2)
+    _shown_lemmas(scan, alone_1, alone_2)
 
 
-def _shown_lemmas(tested: Tested, alone_1: Signal, alone_2: Signal) -> None:
-    proof, inside = tested.proof, tested.sheet.inside
+def _shown_lemmas(scan: SelfTestScan, alone_1: Signal, alone_2: Signal) -> None:
+    proof, inside = scan.proof, scan.sheet.inside
     slot, clock, asks = inside["test.slot_state"], inside["test.clock"], inside["test.asks"]
     number = inside["test.number"]
     proof.lemma((slot == REST) | asks)
-    proof.lemma(~tested.sheet.dut.slots.valid | inside["test.tells"] & ~asks)
-    proof.lemma(~(asks | tested.sheet.dut.slots.valid) | (number <= len(tested.driven)))
-    proof.lemma(number <= len(tested.driven) + 1)
+    proof.lemma(~scan.sheet.dut.slots.valid | inside["test.tells"] & ~asks)
+    proof.lemma(~(asks | scan.sheet.dut.slots.valid) | (number <= len(scan.driven)))
+    proof.lemma(number <= len(scan.driven) + 1)
     with proof.m.If((slot == SEE) & (clock == 1)):
-        proof.lemma(alone_1 == tested.line())
+        proof.lemma(alone_1 == scan.line())
     with proof.m.If((slot == SEE) & (clock == SEEN)):
-        proof.lemma((alone_2 == tested.line()) & (alone_1 == 0))
-    line_before = proof.before(tested.line())
+        proof.lemma((alone_2 == scan.line()) & (alone_1 == 0))
+    line_before = proof.before(scan.line())
     with proof.m.If(((slot == DRIVE) & (clock != 0)) | (slot == SEE)):
-        proof.lemma(line_before == tested.line())
+        proof.lemma(line_before == scan.line())
 
 
 _BUGS = (

@@ -7,7 +7,7 @@ from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga.wire import protocol
-from contactfpga.wire.numbered import SheetPlace
+from contactfpga.wire.sheet_number import SheetPlace
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.several import RoundRobin
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase

@@ -64,7 +64,7 @@ def frames_leave_whole(proof: Proof, skin: Skin) -> None:
         proof.claim(~offered[1] | (dut.words.payload.data == offered[2:-1]))
         proof.claim(dut.words.payload.last == offered[-1])
     _lemmas(proof, inside, place, at, (count, filled), whole, left)
-    proof.lemma((inside["number"] == number) & (inside["owed"] == lost))
+    proof.lemma((inside["number"] == number) & (inside["must_keep"] == lost))
 
 
 class _Frame:
@@ -88,10 +88,10 @@ def _closing_word(dut: Records, number):
 
 def _lemmas(proof: Proof, inside: Inside, place, at, filling: tuple, whole: _Frame, left: _Frame) -> None:
     count, filled = filling
-    half, bits = inside["half"], len(inside["place"])
+    half, bits = inside["read_half"], len(inside["place"])
     read, write = (inside.word("store", Cat(place, Const(0, 8))[:bits] | (side << bits)) for side in (half, ~half))
     proof.lemma(inside["place"] == count)
-    proof.lemma((inside["waits"] == whole.there) & (inside["reads"] == left.there))
+    proof.lemma((inside["frame_waits"] == whole.there) & (inside["reading"] == left.there))
     proof.lemma(~whole.there | (count == 0) & (inside["end"] == whole.last))
     proof.lemma(~whole.there | (place > whole.last) | (write == whole.word))
     proof.lemma((place >= count) | (write == filled.word))
@@ -107,11 +107,11 @@ def _lemmas(proof: Proof, inside: Inside, place, at, filling: tuple, whole: _Fra
 _BUGS = (
     Bug("a frame is overwritten as it is read", Records, "write__addr",
         lambda address, _: address ^ (1 << len(address) - 1)),
-    Bug("a frame waits on while the next one is filled", Records, "waits",
-        lambda waits, inside: waits | inside["waits"] & ~inside.component.item.end),
-    Bug("a replaced frame is not made up for", Records, "owed", lambda *_: 0),
+    Bug("a frame waits on while the next one is filled", Records, "frame_waits",
+        lambda waits, inside: waits | inside["frame_waits"] & ~inside.component.item.end),
+    Bug("a replaced frame is not made up for", Records, "must_keep", lambda *_: 0),
     Bug("the last word is not marked", Records, "closes", lambda *_: 0),
-    Bug("a word is dropped while the reader waits", Records, "fetches", lambda _, inside: inside["reads"]),
+    Bug("a word is dropped while the reader waits", Records, "fetches", lambda _, inside: inside["reading"]),
     Bug("two fields change places", Records, "closing.cells", lambda _, inside: inside.component.summary.zones),
     Bug("a restart leaves items", Records, "place",
         lambda place, inside: Mux(inside.component.restart, inside["place"], place)),

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contactfpga import terminal
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
-from contactfpga.design.circuit.fitted import PROBABILITY
+from contactfpga.design.circuit.fit import PROBABILITY
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.fitted import FittedForce, fit_force
 from contactfpga.design.kits import Kit

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Protocol
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit
+from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.instruments.settling import Settling

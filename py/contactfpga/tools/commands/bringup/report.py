@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from contactfpga import __version__
-from contactfpga.design.circuit.fitted import PROBABILITY, FittedCircuit, FittedValue
+from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit, FittedValue
 from contactfpga.design.cover.fitted import FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
@@ -97,7 +97,7 @@ class BringUpReport:
         }
 
     def _circuit(self) -> list[FittedValue]:
-        return [one for one in self.fitted.values if one.told] if self.fitted is not None else []
+        return [one for one in self.fitted.values if one.determined] if self.fitted is not None else []
 
     def to_markdown(self) -> str:
         parts = [f"# Bring-up of the {self.kit.name} kit, {self.when.isoformat()}\n", *self._head()]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from contactfpga.design.circuit import CircuitError
-from contactfpga.design.circuit.fitted import SettleReading, fit_circuit
+from contactfpga.design.circuit.fit import SettleReading, fit_circuit
 from contactfpga.design.circuit.values import LIMITS
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
@@ -102,20 +102,20 @@ def circuit(bench: Bench) -> Step:
     except ContactFPGAError as error:
         found.append(Finding("note", f"[circuit] is not fitted: {error}"))
         return Step("circuit", tuple(found))
-    told = {}
+    values = {}
     for one in bench.fitted.values:
-        if not one.told:
+        if not one.determined:
             unit = LIMITS[one.name][2]
             vague = f"{one.name} cannot be told better than {one.low:.4g} to {one.high:.4g} {unit} with this clock"
             found.append(Finding("note", vague))
             continue
-        told[one.name] = one.value
+        values[one.name] = one.value
         given = getattr(bench.stated, one.name)
         inside = "as stated" if one.low <= given <= one.high else f"not the {given:g} that the kit states"
         found.append(Finding("ok", f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}), {inside}"))
     if len(bench.fitted.values) < 2:
         found.append(Finding("note", "switch_ohm cannot be told from one settle image; it was taken as stated"))
-    return Step("circuit", tuple(found), told)
+    return Step("circuit", tuple(found), values)
 
 
 def _reading(image: Settling, broken: Sequence[int], guard: bool) -> SettleReading:

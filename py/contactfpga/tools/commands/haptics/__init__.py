@@ -28,5 +28,5 @@ def run(topic: Callable[[], int]) -> int:
     except (HapticsError, OSError) as error:
         if isinstance(error, BrokenPipeError):
             raise
-        interrupt.failed(HapticsError(files.told(error)) if isinstance(error, OSError) else error)
+        interrupt.failed(HapticsError(files.reason_of(error)) if isinstance(error, OSError) else error)
         return BAD_INPUT

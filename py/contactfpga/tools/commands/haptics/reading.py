@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from contactfpga.inputs.files import read_small, told
+from contactfpga.inputs.files import read_small, reason_of
 from contactfpga.inputs.values import shown, suggestion
 from contactfpga.robot.haptics.contact import Touch
 from contactfpga.robot.haptics.units import LoadCells, Unit
@@ -23,7 +23,7 @@ def load(path: str | Path, keys: tuple[str, ...]) -> dict[str, Any]:
     try:
         values = json.loads(read_small(path, MAX_BYTES, "a JSON file", HapticsError))
     except OSError as error:
-        raise HapticsError(told(error)) from None
+        raise HapticsError(reason_of(error)) from None
     except HapticsError:
         raise
     except RecursionError:

@@ -26,7 +26,7 @@ def _path(kind: str, key: str) -> Path:
     return ready(cache_folder()) / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
 
 
-def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
+def cached(kind: str, key: str, new: Callable[[], Any]) -> Any:
     """The cached value of ``new()``, which must be plain JSON."""
     path = _path(kind, key)
     if whole(path, tell=True):

@@ -76,20 +76,20 @@ class Schedule:
     def _next(self):
         waiting = [seat for seat in self._seats.values() if not seat.done]
         if self._stuck is None and self.steps > MOST_STEPS:
-            self._stuck = f"no end after {self.steps} steps: {self._told(waiting)}"
+            self._stuck = f"no end after {self.steps} steps: {self._described(waiting)}"
         if self._stuck is not None:
             return next((seat for seat in waiting if seat is not self._main), self._main)
         able = [seat for seat in waiting if seat.ready is None or seat.ready() or self.clock() >= seat.until]
         if not able:
             timed = [seat for seat in waiting if seat.until < math.inf]
             if not timed:
-                self._stuck = f"no thread can go on: {self._told(waiting)}"
+                self._stuck = f"no thread can go on: {self._described(waiting)}"
                 return self._next()
             return min(timed, key=lambda seat: seat.until)  # the time passes, as nothing else happens
         awake = [seat for seat in able if seat.left_out <= self.steps]
         return self.rng.choice(awake or able)
 
-    def _told(self, waiting):
+    def _described(self, waiting):
         return ", ".join(seat.name for seat in waiting)
 
     def _start(self, function, name):
@@ -172,19 +172,19 @@ class _Condition(_Lock):
 
     def wait(self, timeout=None):
         assert self._owner == threading.get_ident()
-        depth, told = self._depth, []
+        depth, notified = self._depth, []
         self._owner, self._depth = None, 0
-        self._waiting.append(told)
+        self._waiting.append(notified)
         until = math.inf if timeout is None else self._schedule.clock() + timeout
         try:
-            self._schedule.pause(lambda: told, until)
+            self._schedule.pause(lambda: notified, until)
         finally:
-            self._waiting = [one for one in self._waiting if one is not told]
+            self._waiting = [one for one in self._waiting if one is not notified]
         self.acquire()
         self._depth = depth
-        return bool(told)
+        return bool(notified)
 
     def notify_all(self):
         assert self._owner == threading.get_ident(), "notified without the lock"
-        for told in self._waiting:
-            told.append(True)
+        for notified in self._waiting:
+            notified.append(True)

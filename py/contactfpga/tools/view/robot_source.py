@@ -85,7 +85,7 @@ class RobotCopy:
     def force_n(self, link: str) -> float:
         return float(sum(touch.push_n for touch in self.sheets[link].touches))
 
-    def told(self, link: str) -> str:
+    def pressed_by(self, link: str) -> str:
         return f"pressed by {self.force_n(link):.1f} N, most so far {self.most_n[link]:.1f} N"
 
     def states(self) -> dict[str, LinkState]:

@@ -54,7 +54,7 @@ class FittedValue:
     high: float
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the readings determine the value, by an interval within a circuit's limits."""
         least, most, _ = LIMITS[self.name]
         return least < self.low and self.high < most
