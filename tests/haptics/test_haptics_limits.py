@@ -32,7 +32,7 @@ def test_a_frame_takes_no_longer_than_a_few_small_solves(count):
     """Readings to contacts, with places that are unsure.
 
     At most 50 us where numpy solves six equations in 6.7 us, with as much again for a busy machine: an idle one takes
-    7.5 solves for one contact and 9.5 for two. A round has one after the other, so that a busy machine slows them
+    6.2 solves for one contact and 7.7 for two. A round has one after the other, so that a busy machine slows them
     alike.
     """
     cells, six = hexapod(60, 0.075), np.random.default_rng(1).random((6, 6))

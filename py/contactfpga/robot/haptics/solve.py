@@ -146,7 +146,7 @@ AXES: tuple[Vector, ...] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 def _one(wrench: Wrench, touch: Touch) -> Closed | None:
     """The closed form of one contact, of any friction; None if it pulls."""
-    force, _, chi2 = _without_moment(wrench, AXES, touch.point_m, [touch], [wrench.force_n])
+    force, chi2 = _at_point(wrench, touch)
     push = -dot(touch.normal, force)
     beyond = not _within(touch, force, push)
     return None if push < 0 else ([force], [], chi2, beyond)
@@ -160,7 +160,7 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Closed | None:
     along = (ax - bx) / length, (ay - by) / length, (az - bz) / length
     middle = (ax + bx) / 2, (ay + by) / 2, (az + bz) / 2
     split = _split(wrench.force_n, wrench.moment_nm, middle, along, length)
-    force, moment, chi2 = _without_moment(wrench, (along,), middle, touches, split)
+    force, moment, chi2 = _about_line(wrench, along, middle, touches, split)
     forces, curve, slope = _split(force, moment, middle, along, length), 0.0, 0.0
     for touch, one, sign in zip(touches, forces, (1, -1)):
         more = sign * dot(touch.normal, along)
@@ -176,34 +176,47 @@ def _two(wrench: Wrench, touches: Sequence[Touch]) -> Closed | None:
     return forces, null, chi2, False
 
 
-def _without_moment(
-    wrench: Wrench, axes: Sequence[Vector], point: Vector, touches: Sequence[Touch], forces: Sequence[Vector]
+def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
+    """The force nearest to the wrench's that has no moment about the touch's point, and its distance in squares of
+    noise, to which the uncertain point adds about as with the wrench's force.
+
+    Numbers so few are faster in plain Python than in numpy.
+    """
+    force, (x, y, z) = wrench.force_n, touch.point_m
+    if wrench.noise is None:
+        return force, None
+    sides = np.array((0.0, z, -y, 1.0, 0.0, 0.0, -z, 0.0, x, 0.0, 1.0, 0.0, y, -x, 0.0, 0.0, 0.0, 1.0)).reshape(3, 6)
+    both = sides @ wrench.noise.covariance
+    rest = _plus(wrench.moment_nm, -1.0, cross(touch.point_m, force))
+    moved = touch.point_sigma_m * force[0], touch.point_sigma_m * force[1], touch.point_sigma_m * force[2]
+    square = dot(moved, moved)
+    spread = zip((both @ sides.T).tolist(), AXES, moved)
+    first, second, third = [_plus(_plus(row, square, axis), -part, moved) for row, axis, part in spread]
+    inverse = cross(second, third), cross(third, first), cross(first, second)
+    over = 1 / dot(first, inverse[0])
+    shares = [over * dot(row, rest) for row in inverse]
+    for share, row in zip(shares, both.tolist()):
+        force = _plus(force, -share, row)
+    return force, dot(rest, shares)
+
+
+def _about_line(
+    wrench: Wrench, axis: Vector, point: Vector, touches: Sequence[Touch], forces: Sequence[Vector]
 ) -> tuple[Vector, Vector, float | None]:
-    """Force and moment nearest to the wrench's that have no moment about one or three axes through a point, and their
-    distance in squares of noise, to which the touches' uncertain places add about as with these forces."""
+    """Force and moment nearest to the wrench's that have no moment about the axis through a point, and their distance
+    in squares of noise, to which the touches' uncertain points add about as with these forces."""
     force, moment = wrench.force_n, wrench.moment_nm
     if wrench.noise is None:
         return force, moment, None
-    sides: list[tuple[float, ...]] = [cross(point, axis) + axis for axis in axes]
-    rests = [dot(side, force) + dot(axis, moment) for side, axis in zip(sides, axes)]
-    for touch, (x, y, z) in zip(touches, forces):
-        if sigma := touch.point_sigma_m:
-            moved = sigma * x, sigma * y, sigma * z
-            sides = [side + cross(axis, moved) for side, axis in zip(sides, axes)]
-    unsure = np.array(sides)
-    both = unsure.copy()
-    both[:, :6] = unsure[:, :6] @ wrench.noise.covariance
-    spread = (both @ unsure.T).tolist()
-    if len(axes) == 1:
-        shares = [rests[0] / spread[0][0]]
-    else:
-        first, second, third = spread
-        inverse = cross(second, third), cross(third, first), cross(first, second)
-        over = 1 / dot(first, inverse[0])
-        shares = [over * dot(row, rests) for row in inverse]
-    fx, fy, fz, mx, my, mz = (np.array(shares) @ both[:, :6]).tolist()
-    chi2 = sum([rest * share for rest, share in zip(rests, shares)])
-    return (force[0] - fx, force[1] - fy, force[2] - fz), (moment[0] - mx, moment[1] - my, moment[2] - mz), chi2
+    lever = cross(point, axis)
+    side, rest = np.array((*lever, *axis)), dot(lever, force) + dot(axis, moment)
+    both = wrench.noise.covariance @ side
+    spread = float(both @ side)
+    for touch, one in zip(touches, forces):
+        moved = cross(axis, one)
+        spread += touch.point_sigma_m**2 * dot(moved, moved)
+    share, row = rest / spread, both.tolist()
+    return _plus(force, -share, row), _plus(moment, -share, row[3:]), rest * share
 
 
 def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> list[Vector]:
@@ -213,7 +226,7 @@ def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length:
     return [_plus(half, 1 / length, couple), _plus(half, -1 / length, couple)]
 
 
-def _plus(first: Vector, share: float, second: Vector) -> Vector:
+def _plus(first: Sequence[float], share: float, second: Sequence[float]) -> Vector:
     return first[0] + share * second[0], first[1] + share * second[1], first[2] + share * second[2]
 
 
