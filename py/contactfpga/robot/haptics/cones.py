@@ -39,6 +39,9 @@ UNBOUNDED = 500.0
 LARGEST = 1e3
 """Mean push, in multiples of the measured force, up to which programs search."""
 
+ANY_FRICTION = 100.0
+"""Friction whose cones leave out hardly any force that pushes."""
+
 SMALLEST = 1e-9
 """Weight of the squared forces against their squared misfit, where both count."""
 
@@ -46,7 +49,8 @@ FOUND = 1e-6
 """Error of a cone program up to which it has forces that exert the wrench."""
 
 USABLE = 1e-4
-"""Error of a cone program, as a share of the result, up to which there is a result."""
+"""Error of a cone program, as a share of the result, up to which there is a result; without one a range is 0 to any
+push."""
 
 
 class _Space:
@@ -69,11 +73,6 @@ class _Space:
             return np.asarray(shares @ self.right)
         weighted = self.right / _weights(self.right.shape[1] // 3)
         return np.asarray(np.linalg.solve(weighted @ self.right.T, shares) @ weighted)
-
-
-def _check(error: float) -> None:
-    if not error < USABLE:
-        raise HapticsError(f"pushes are known to {error:.2g} of their size only; do contacts lie in one point?")
 
 
 def _used(frictions: Floats) -> NDArray[np.bool_]:
@@ -124,30 +123,33 @@ class Cones:
         surface; and False. Where friction is not enough: True, and those of any friction if they fit significantly
         better."""
         shares = self._wanted @ self._space.left
-        forces = self._least_squares()
+        forces, all_push = self._least_squares()
         square = float(self._wanted @ self._wanted)
         worse = self.misfit(forces) > square - float(shares @ shares) + ROUNDING * square
         if not self._frictions.any():
             return forces if not worse or self._is_nearest(forces) else self._nearest(), False
-        if not worse and self._allowed(forces):
-            return forces, False
-        found = self._smallest(shares / self._space.values) if len(self.null) else None
-        if found is not None:
-            return found, False
+        allowed = not worse and self._allowed(forces)
+        found = self._smallest(shares / self._space.values) if len(self.null) and not (allowed and all_push) else None
+        if found is not None or allowed:
+            return forces if found is None else found, False
+        if not all_push:
+            frictions = np.where(self._frictions > 0, ANY_FRICTION, 0.0).tolist()
+            pushing = Cones(self._matrix, self._wanted, frictions)._nearest()
+            forces = pushing if self.misfit(pushing) < self.misfit(forces) else forces
         found = self._nearest()
         return (found if self.misfit(found) < self.misfit(forces) + CHI2_1 else forces), True
 
-    def _least_squares(self) -> Floats:
-        """Forces of least squares, without the contacts that would pull."""
+    def _least_squares(self) -> tuple[Floats, bool]:
+        """Forces of least squares, without the contacts that would pull; whether none would."""
         pushing, space = np.ones(len(self._used), bool), self._space
         while True:
             forces = space.smallest(self._wanted @ space.left / space.values)
             pulls = np.repeat(forces[::3] < min(0.0, forces[::3].min() / 2), 3)
             if not pulls.any():
-                return forces
+                return forces, bool(pushing.all())
             pushing &= ~pulls
             if not pushing.any():
-                return np.zeros(len(forces))
+                return np.zeros(len(forces)), False
             space = _Space(self._matrix, self._used & pushing)
 
     def _allowed(self, forces: Floats) -> bool:
@@ -165,7 +167,8 @@ class Cones:
         square = SMALLEST * _weights(len(self._frictions))
         rows = space.values[:, None] * space.right / space.values[0]
         found, error = self._least(rows, shares / length, length / float(space.values[0]), 1.0, square)
-        _check(error)
+        if not error < USABLE:
+            raise HapticsError(f"pushes are known to {error:.2g} of their size only; do contacts lie in one point?")
         return found
 
     def _smallest(self, shares: Floats) -> Floats | None:
@@ -255,7 +258,8 @@ class Cones:
         for number, at in enumerate(asked):
             slopes[2 * number, at, 0], slopes[2 * number + 1, at, 0] = 1.0, -1.0
         found, gains, errors = program.least(slopes)
-        _check(float(errors.max()))
-        ends = (slopes * found).sum(axis=(1, 2)).reshape(-1, 2).tolist()
+        least, most = size * (slopes * found).sum(axis=(1, 2)).reshape(-1, 2).T * [[1], [-1]]
         more = gains[1::2, -1, 0]  # of the largest, per doubled bound
-        return [(size * a, None if -b > UNBOUNDED or c > 1 else -size * b) for (a, b), c in zip(ends, more)]
+        bounded = (most <= UNBOUNDED * size) & (more <= 1) & (errors[1::2] < USABLE)
+        least = np.where(errors[::2] < USABLE, least, 0.0)
+        return [(low, high if end else None) for low, high, end in zip(least.tolist(), most.tolist(), bounded.tolist())]

@@ -67,10 +67,7 @@ class Program:
             errors = np.where(better, error, errors)
             if not going.any():
                 break
-            try:
-                dx, dz, dy, share = self._step(x, z, off, rest, gap)
-            except np.linalg.LinAlgError:  # rounding at the very end
-                break
+            dx, dz, dy, share = self._step(x, z, off, rest, gap)
             share = np.where(going & np.isfinite(share), share, 0.0)[:, None, None]
             x, z, y = x + _part(share, dx), z + _part(share, dz), y + _part(share[:, 0], dy)
         return best, gains, errors
@@ -89,12 +86,12 @@ class Program:
         out, back, even = self._scaling(x, z)
         way = out @ out
         if self._square is not None:
-            way = out @ np.linalg.inv(np.eye(len(self._flip)) + out * self._square[:, None] @ out) @ out
+            way = out @ _inverses(np.eye(len(self._flip)) + out * self._square[:, None] @ out) @ out
         flat = self._columns.reshape(-1, len(self._wanted))
         system = flat.T @ (way @ self._columns).reshape(len(x), *flat.shape)
         over = 1 / np.sqrt(np.diagonal(system, axis1=1, axis2=2))
         scale = over[:, :, None] * over[:, None]
-        inverse = np.asarray(scale * np.linalg.inv(scale * system + ROUNDING * np.eye(len(self._wanted))), float)
+        inverse = scale * _inverses(scale * system + ROUNDING * np.eye(len(self._wanted)))
 
         def moved(wanted: Floats) -> tuple[Floats, Floats, Floats]:
             dx, dy = _times(way, _times(back, wanted) - rest), np.zeros(off.shape)
@@ -128,6 +125,16 @@ class Program:
         # The share is 1 / t at the largest root of level t^2 + 2 slope t + the level of the way.
         most = (np.sqrt(np.maximum(0.0, slope * slope - level * _level(way))) - slope) / level
         return np.asarray(1 / np.maximum(most.max(axis=1), BACK))
+
+
+def _inverses(matrices: Floats) -> Floats:
+    """(m, ..., n, n) inverses; NaN for each of the m that has a singular matrix, as rounding makes it near the end."""
+    try:
+        return np.asarray(np.linalg.inv(matrices), float)
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full(matrices.shape, np.nan)
+        return np.concatenate([_inverses(one[None]) for one in matrices])
 
 
 def _level(x: Floats) -> Floats:
