@@ -159,7 +159,7 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 endef
 
 # What an installation is made of; it compiles the reader in C.
-INSTALLED := pyproject.toml pip-constraints.txt hatch_build.py $(wildcard c/*.[ch])
+INSTALLED := pyproject.toml pip-constraints.txt $(wildcard hatch_build.py c/*.[ch])
 
 $(VENV)/.stamp-sim: $(VENV)/.stamp-venv $(INSTALLED)
 	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)

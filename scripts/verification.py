@@ -38,8 +38,8 @@ This page is for a reader who doubts a claim. It lists the tests of each claim, 
 
       python -m pytest tests/gateware/test_scan.py
 
-CI runs every third case of each quick test of `make test-all` and of each file's slow ones, which the commit draws, and fails when a test
-of a claim fails or is skipped. Tests are skipped only where the list names a tool that they need and the machine lacks.
+CI runs every third case of each quick test of `make test-all`, and of each file's slow ones, which the commit draws. It
+fails when a test of a claim fails or is skipped. Tests are skipped only where they need a tool that the machine lacks.
 
 ## Claims by subject
 

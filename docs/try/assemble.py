@@ -14,7 +14,8 @@ import sys
 from pathlib import Path
 
 from contactfpga.design import kits
-from contactfpga.design.cover import cells_of, load_cover
+from contactfpga.design.cover import BODIES, cells_of, load_cover
+from contactfpga.design.cover.layers import COUPLING, Layer
 from contactfpga_sim.model.board import webassembly
 
 FOLDER = Path(__file__).resolve().parent
@@ -37,7 +38,8 @@ def facts(name: str = KIT) -> dict:
     if cover is None or cover.cap is None or not (cover.cut and cover.cap.proud) or skin.pitch_x_mm != skin.pitch_y_mm:
         raise ValueError(f"the kit {name!r} has no square tiles; cover.js knows nothing else")
     pitch_m = skin.pitch_x_mm * 1e-3
-    cells = cells_of(cover, skin.rows, skin.columns, pitch_m, pitch_m)
+    cells, body = cells_of(cover, skin.rows, skin.columns, pitch_m, pitch_m), BODIES["finger"]
+    layers = cover.layers(body, pitch_m, pitch_m)
     return {
         "name": skin.name,
         "rows": skin.rows,
@@ -47,6 +49,12 @@ def facts(name: str = KIT) -> dict:
         "parts": cells.parts,
         "thresholds_n": cells.thresholds_n.ravel().tolist(),
         "hysteresis": cover.switch.hysteresis,
+        "layers": [
+            [layer.thickness_m, layer.modulus_pa, layer.coupled] for layer in layers if isinstance(layer, Layer)
+        ],
+        "springs": [[layer.stiffness_pa_m, layer.travel_m] for layer in layers if not isinstance(layer, Layer)],
+        "coupling": COUPLING,
+        "depth_m": body.depth_m,
         "most_n": MOST_N,
         "clock_hz": skin.clock_hz,
         "baud": skin.baud,

@@ -169,7 +169,7 @@ def test_check_answers_all_at_once(monkeypatch, tmp_path, capsys):
 
     def fake(skin, board, folder, seed):
         built.append(skin)
-        return build.placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+        return build.pnr_report.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
 
     monkeypatch.setattr(build, "build", fake)
     path = tmp_path / "my.toml"

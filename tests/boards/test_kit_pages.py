@@ -6,10 +6,12 @@ import random
 import re
 import tomllib
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit, needed
@@ -19,8 +21,11 @@ from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
-from contactfpga_sim.lab.kits import predict
+from contactfpga_sim.lab.arm import kits as kits_arm
+from contactfpga_sim.lab.arm.places import Peaks
+from contactfpga_sim.lab.kits import counts, predict, sensitivity, tables
 from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.scenes.families import placements
 
 ONE = Prediction(
     "settle_us", "what", "us", 1.0, 0.5, 2.0, "circuit", "contactfpga settle", datetime.date(2026, 11, 24), "abc"
@@ -51,9 +56,10 @@ def test_predictions_are_what_is_computed_today(name):
     some = latency.measure(kit.skin, touches=12)
     assert some.touch_to_last_byte_us.worst <= found["last_byte_worst_us"].high
     assert some.bytes == found["frame_bytes"].value
-    felt = predict.closing_n(load_cover(kit.skin_path), 1e-3 * kit.skin.pitch_x_mm, 0)
-    for number, force in enumerate(felt):
-        assert found[f"closing_{number}_n"].value == pytest.approx(force, rel=1e-4)
+    level = predict.pressing(load_cover(kit.skin_path), {"spread": 0.0})
+    for name, value in predict.measured(level, kit.skin, 0).items():
+        if not name.startswith("felt_"):
+            assert found[name].value == pytest.approx(value, rel=1e-4)
 
 
 @pytest.mark.slow
@@ -78,14 +84,45 @@ def test_breaks_of_any_line_at_any_time_are_reported_as_predicted(name):
 
 
 def test_draws_are_spread_about_what_is_stated():
-    kit = kits.kit("starter")
-    circuit, cover = load_circuit(kit.skin_path), load_cover(kit.skin_path)
     rng = np.random.default_rng(5)
-    lines = np.array([predict.drawn_circuit(circuit, rng).line_pf for _ in range(200)]) / circuit.line_pf
-    forces = np.array([predict.drawn_cover(cover, rng).switch.force_n for _ in range(200)]) / cover.switch.force_n
-    for drawn, share in ((lines, 0.3), (forces, 0.1)):
-        assert 1 - share <= drawn.min() < 1 - 0.9 * share
-        assert 1 + 0.9 * share < drawn.max() <= 1 + share
+    for tolerance in (*predict.CIRCUIT.values(), *predict.COVER.values()):
+        drawn = np.array([tolerance.drawn(rng) for _ in range(200)])
+        edge = 0.1 * (tolerance.high - tolerance.low)
+        assert tolerance.low <= drawn.min() < tolerance.low + edge
+        assert tolerance.high - edge < drawn.max() <= tolerance.high
+
+
+@pytest.mark.parametrize("key", predict.COVER)
+def test_each_assumption_of_the_cover_moves_a_prediction(key, monkeypatch):
+    """By 1 % or more at its limit; the tilt of caps by as much as one of them has of its own."""
+    monkeypatch.setattr(predict, "ANYWHERE", 10)
+    kit = kits.kit("starter")
+    cover, factor = load_cover(kit.skin_path), predict.TILT if key == "tilt" else predict.COVER[key].high
+    usual, moved = (predict.measured(predict.pressing(cover, of), kit.skin, 1) for of in ({}, {key: factor}))
+    assert usual.keys() == predict.MEASURED.keys()
+    assert max(abs(moved[name] / usual[name] - 1) for name in usual) > (0.001 if key == "tilt" else 0.01)
+
+
+@pytest.mark.slow  # a second each
+@pytest.mark.parametrize("key", predict.CIRCUIT)
+def test_each_assumption_of_the_circuit_moves_a_prediction(key, monkeypatch):
+    """With all others as stated, and itself at its end."""
+    level = dict.fromkeys(predict.CIRCUIT, predict.Tolerance("", 1.0, 1.0))
+    one = predict.CIRCUIT[key]
+    far = one.low if key == "switch_ohm" else one.high
+    monkeypatch.setattr(predict, "CIRCUIT", level | {key: predict.Tolerance("", far, far)})
+    monkeypatch.setattr(predict, "DRAWS", 1)
+    found = [*predict._circuit(kits.kit("fast"))]
+    assert max(each.high / each.low for each in found) > 1.001
+
+
+@pytest.mark.slow
+def test_each_change_of_the_page_moves_a_headline():
+    usual = sensitivity.headlines({}, touches=2, scenes=10)
+    for change in (one for both in sensitivity.CHANGES.values() for one in both):
+        moved = sensitivity.headlines(change, touches=2, scenes=10)
+        least = 1e-3 if "tilt" in change else 5e-3
+        assert max(abs(now / before - 1) for now, before in zip(moved[:4], usual[:4], strict=True)) > least, change
 
 
 def test_a_changed_prediction_is_a_new_entry_that_counts_and_no_edit(tmp_path):
@@ -111,6 +148,31 @@ def test_a_file_that_is_wrong_is_refused(tmp_path):
         predictions.load(kit)
 
 
+def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monkeypatch):
+    """With made-up forces: the foam's thickness in mm, 10 N more of a rigid body, 100 N more of each way."""
+
+    def force(one, way):
+        return 1e3 * one.case.cover.thickness_m + 10 * (one.case.body == "rigid") + 100 * way
+
+    def made_up(study, workers):
+        return {
+            each: [[Peaks(np.array([force(one, way)]), None, None)] * 2 for way in (1, 2, 3, 4)]
+            for each, (one, _) in study.items()
+        }
+
+    monkeypatch.setattr(kits_arm, "ways", lambda kit, finger: ((),) * 4)
+    monkeypatch.setattr(kits_arm.anywhere, "ways", lambda case, skin: ((),) * 4)
+    monkeypatch.setattr(kits_arm.anywhere, "many", made_up)
+    text = kits.kit("starter").skin_path.read_text()
+    (tmp_path / "skin.toml").write_text(text.replace("thickness_m = 0.002", "thickness_m = 0.003"))
+    thick = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
+    rows = list(tables._peak_rows([tables.KitFigures(thick, None, ())]))
+    assert [row[1] for row in rows] == [
+        f"**{n}03.0 / {n}03.0 N** forearm, **{n}13.0 / {n}13.0 N** rigid" for n in "214"
+    ]
+    assert all("05.0 / " in row[2] for row in rows)
+
+
 def test_the_tutorial_lists_the_parts_of_the_starter_kit():
     page = Path("docs/starter.md").read_text(encoding="utf-8")
     kit = kits.kit("starter")
@@ -122,3 +184,14 @@ def test_the_tutorial_lists_the_parts_of_the_starter_kit():
     beside = re.findall(r"^\| (\d+) \| ([^|]*) \|$", page, re.MULTILINE)
     assert [int(count) for count, _ in beside] == [part.count for part in kit.parts]
     assert all(part.number in what for part, (_, what) in zip(kit.parts, beside, strict=True))
+
+
+def test_a_scene_is_miscounted_whose_zones_are_not_as_many_as_its_contacts():
+    """The oracle is scipy's: fingers 5 mm apart are as many contacts."""
+    kit = kits.kit("starter")
+    cover, drawn = load_cover(kit.skin_path), counts.Drawn("light fingers", "fingers", 60, (0.5, 1.5))
+    with ThreadPoolExecutor(1) as workers:
+        found = counts.miscounted(kit.skin, cover, drawn, workers)
+    scenes = placements("fingers", 60, counts.SEED, kit.skin, force_n=(0.5, 1.5))
+    wrong = [ndimage.label(one.pressed(0.0, kit.skin, cover))[1] != len(one.contacts) for one in scenes]
+    assert 0 < found.hits == sum(wrong) < found.of == 60

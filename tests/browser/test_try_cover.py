@@ -3,10 +3,10 @@
 import json
 
 import numpy as np
-from try_page import assemble, kit, needs_node, node
+from try_page import assemble, kit, load, needs_node, node
 
 from contactfpga.design import kits
-from contactfpga.design.cover import Cells, Ellipse, Load, load_cover
+from contactfpga.design.cover import Cells, load_cover
 
 pytestmark = needs_node
 
@@ -24,7 +24,7 @@ def test_random_fingers_close_the_same_switches():
     for _ in range(1000):
         fingers = [finger(rng, skin) for _ in range(rng.integers(0, 11))]
         pairs.append((fingers, before.astype(int).ravel().tolist()))
-        loads = [Load((ellipse(each),), each["force_n"]) for each in fingers]
+        loads = [load(cells, each) for each in fingers]
         forces = cells.forces_n(loads)
         expected.append((forces, before))
         before = cells.closed_by(forces, before)
@@ -44,8 +44,3 @@ def finger(rng: np.random.Generator, skin) -> dict:
     """Anywhere that the page lets a finger be, of any size and force that it offers."""
     x, y = (rng.uniform(-0.5, count - 0.5) * skin.pitch_x_mm for count in (skin.columns, skin.rows))
     return {"x_mm": x, "y_mm": y, "radius_mm": rng.uniform(2, 15), "force_n": 10 ** rng.uniform(-1, 1)}
-
-
-def ellipse(finger: dict) -> Ellipse:
-    half_m = finger["radius_mm"] * 1e-3
-    return Ellipse(half_m, half_m, finger["x_mm"] * 1e-3, finger["y_mm"] * 1e-3)

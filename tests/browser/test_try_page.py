@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from try_page import assemble
+from try_page import assemble, load
 
 pytest.importorskip("viser")
 pytest.importorskip("playwright")
@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 from scipy import ndimage
 
 from contactfpga.design import kits
-from contactfpga.design.cover import Ellipse, Load, cells_of, load_cover
+from contactfpga.design.cover import cells_of, load_cover
 from contactfpga_sim.lab.view import browser
 
 pytestmark = [
@@ -91,7 +91,9 @@ def closed_on(page):
     cover, pitch_m = load_cover(KIT.skin_path), PITCH_MM * 1e-3
     cells = cells_of(cover, *closed.shape, pitch_m, pitch_m)
     fingers = fingers_of(page)
-    loads = [Load((Ellipse(r * 1e-3, r * 1e-3, x * 1e-3, y * 1e-3),), force) for x, y, force, r in fingers]
+    loads = [
+        load(cells, {"x_mm": x, "y_mm": y, "force_n": force, "radius_mm": radius}) for x, y, force, radius in fingers
+    ]
     assert not (cells.closed(loads) & ~closed).any()
     assert not (closed & ~cells.closed(loads, np.ones_like(closed))).any()
     return closed

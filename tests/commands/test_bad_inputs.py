@@ -297,7 +297,7 @@ BASES = {
     "skin": [["zones", "sim://", "--skin"], (ROOT / "examples/icebreaker-64x64.toml").read_text()],
     "cover": [
         ["board", "--skin"],
-        "rows = 8\n[cover]\nmodel = 'bonded'\nthickness_m = 0.005\n[cover.switch]\n",
+        "rows = 8\n[cover]\nmodel = 'foam'\nthickness_m = 0.005\n[cover.switch]\n",
     ],
     "patch": [["board", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
     "design": [["cover", "design"], (ROOT / "examples/paper-second-design.toml").read_text()],

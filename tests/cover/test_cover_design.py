@@ -10,8 +10,9 @@ from scipy import integrate
 from contactfpga import Skin
 from contactfpga.design.cover import elastic
 from contactfpga.design.cover.design import FREE, design
+from contactfpga.design.cover.foams import Foam, find
 from contactfpga.design.cover.sense import Model, PaddedSheet
-from contactfpga.design.cover.task import Foam, Task, find
+from contactfpga.design.cover.task import Task
 from contactfpga.skin.latency import latency_s
 
 ROOT = Path(__file__).resolve().parents[2]

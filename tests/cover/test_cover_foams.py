@@ -9,7 +9,8 @@ import pytest
 from contactfpga import Skin
 from contactfpga.design.cover import CoverError, line
 from contactfpga.design.cover.design import design
-from contactfpga.design.cover.task import FOAMS, Foam, Task, find
+from contactfpga.design.cover.foams import FOAMS, Foam, find
+from contactfpga.design.cover.task import Task
 from contactfpga.skin.latency import latency_s
 
 ROOT = Path(__file__).resolve().parents[2]

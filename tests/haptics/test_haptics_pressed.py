@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from contactfpga.cover import CoverError
-from contactfpga.design.cover import Ball, Cap, Cells, Cover, Ellipse, Load, Switch, elastic
+from contactfpga.design.cover import BODIES, Cap, Cells, Cover, Load, Switch
 from contactfpga.robot.haptics.pressed import RADII_M, Pressed
 
-TILES = Cover("frictionless", 0.003, Switch(force_n=0.3), cap=Cap(0.0098))
+TILES = Cover("foam", 0.003, Switch(force_n=0.3), cap=Cap(0.0098))
 PITCH = 0.01
 
 
@@ -15,11 +15,13 @@ PITCH = 0.01
 def touched():
     """(n, 2): count of cells, and squared distance in m2 of their middle from the touch, for pushes of 5 N."""
     rng, cells, found = np.random.default_rng(1), Cells(TILES, 9, 9, PITCH, PITCH), []
-    modulus = elastic.effective_modulus_pa(TILES.modulus_pa, TILES.poisson)
-    for _ in range(600):
+    rigid = BODIES["rigid"]
+    balls = [cells.indentation([rigid.ball(radius)], rigid) for radius in RADII_M]
+    for _ in range(1200):
         x, y = rng.uniform(3.5, 4.5, 2) * PITCH
-        radius = Ball(RADII_M[rng.integers(3)], modulus).patch_m(5.0)
-        rows, columns = np.nonzero(cells.closed([Load((Ellipse(radius, radius, x, y),), 5.0)]))
+        ball = balls[rng.integers(3)]
+        (part,) = ball.parts_at(ball.depth_m(5.0))
+        rows, columns = np.nonzero(cells.closed([Load((part.placed(x, y, 0.0),), 5.0)]))
         found.append((len(rows), (columns.mean() * PITCH - x) ** 2 + (rows.mean() * PITCH - y) ** 2))
     return np.array(found)
 

@@ -41,7 +41,7 @@ def test_a_contact_presses_what_is_near_it_either_way_around(x_mm):
     assert np.array_equal(one(contacts.disc(20.0), x_mm).pressed(0.0, FOREARM), near)
 
 
-@pytest.mark.parametrize("model", ["patch", "point", "hertz"])
+@pytest.mark.parametrize("model", ["patch", "point", "foam"])
 def test_the_cover_feels_no_seam(model):
     cover = Cover(model=model)
     scene = Scene(contacts.pair(5.0, 12.0, 6.3 * PITCH, 71.0, 30.0, force_n=60.0))

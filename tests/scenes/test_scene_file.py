@@ -166,7 +166,10 @@ def test_what_a_file_says_is_what_is_read(load):
         ("[[contact]]\n", "contact 1: shape is None; it must be one of disc, ellipse, edge, palm, sole"),
         ('[[contact]]\nshape = "cube"', "contact 1: shape is 'cube'; it must be one of disc"),
         ('[[contact]]\nshape = "disc"', "contact 1: radius_mm is missing"),
-        (DISC + "length_mm = 3", "contact 1, a disc, has the key 'length_mm'; known are radius_mm, shape, number"),
+        (
+            DISC + "length_mm = 3",
+            "contact 1, a disc, has the key 'length_mm'; known are radius_mm, shape, body, number",
+        ),
         (DISC.replace("10", "0"), "contact 1: radius_mm is 0; it must lie between 0.01 and 100000"),
         (DISC.replace("10", "[9, 8]"), "contact 1: radius_mm is [9, 8]; the least comes first"),
         (DISC.replace("10", "[1, 2, 3]"), "contact 1: radius_mm is [1, 2, 3]; it must be a number or [least, most]"),
@@ -178,6 +181,7 @@ def test_what_a_file_says_is_what_is_read(load):
         (DISC + "x_mm = {seconds = 1}", "contact 1: x_mm is {'seconds': 1}; it must be {seconds = [...], values"),
         (DISC + "x_mm = {seconds = [0], values = [1, 2]}", "contact 1: x_mm: a track has 1 times and 2 values"),
         (DISC + "x_mm = {seconds = [0], values = ['a']}", "contact 1: x_mm: values is 'a'; it must be a finite number"),
+        (DISC + 'body = "foot"', "contact 1: body is 'foot'; it must be one of finger, palm, forearm, rigid"),
         (DISC + "x_mm = {hertz = 1}", "contact 1: x_mm has the key 'hertz'; known are seconds, values"),
         (
             DISC + "speed_mm_s = 1\nx_mm = {seconds = [0], values = [1]}",

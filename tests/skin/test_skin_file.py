@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin, SkinError, examples
-from contactfpga.design.cover import Cap, Cover, CoverError, Switch, load_cover
+from contactfpga.design.cover import Cap, Cover, CoverError, Switch, foams, load_cover
 from contactfpga.design.cover.press import read_cover, write_cover
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
@@ -201,7 +201,7 @@ def test_empty_file_is_the_reference_skin(tmp_path):
 
 COVERED = """rows = 8
 [cover]
-model = "bonded"
+model = "foam"
 thickness_m = 0.004
 [cover.switch]
 force_n = 0.5
@@ -212,7 +212,7 @@ def test_a_file_with_a_cover(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text(COVERED)
     assert Skin.load(path) == Skin(rows=8)
-    assert load_cover(path) == Cover("bonded", 0.004, Switch(0.5))
+    assert load_cover(path) == Cover("foam", 0.004, Switch(0.5))
     path.write_text(Skin(rows=8).to_toml() + write_cover(Cover(share=0.25)))
     assert (Skin.load(path), load_cover(path)) == (Skin(rows=8), Cover(share=0.25))
     path.write_text("rows = 8")
@@ -222,7 +222,8 @@ def test_a_file_with_a_cover(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"bonded"', '"sand"', "model is 'sand'; it must be one of patch, point, hertz, bonded, frictionless"),
+        ('"foam"', '"sand"', "model is 'sand'; it must be one of patch, foam, point"),
+        ('"foam"', '"bonded"', "model is 'bonded', which no longer exists; take 'foam'"),
         ("thickness_m", "thickness", "unknown key 'thickness' in [cover]; did you mean 'thickness_m'?"),
         ("force_n = 0.5", "force = 1", "unknown key 'force' in [cover.switch]; did you mean 'force_n'?"),
         ("force_n = 0.5", "force_n = -1", "force_n is -1; it must be a finite number above 0 N"),
@@ -264,6 +265,9 @@ def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
     page = (Path(__file__).resolve().parents[2] / "docs/skin.md").read_text(encoding="utf-8")
     (rows,) = re.findall(rf"^\| `\[{re.escape(table)}\]` .*\n\|[-|]+\|\n((?:\|.*\n)+)", page, re.MULTILINE)
     defaults = dict(re.findall(r"^\| `(\w+)` \| ?([^|]*?) ?\|", rows, re.MULTILINE))
+    if table == "cover":  # a foam is a name for a modulus
+        name = tomllib.loads(f"x = {defaults.pop('foam').strip('`')}")["x"]
+        defaults["modulus_pa"] = str(foams.find(name).layer_pa)
     fields = {field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap")}
     assert defaults.keys() == fields.keys()
     for name, default in fields.items():

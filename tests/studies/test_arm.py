@@ -9,6 +9,7 @@ from arm_oracle import STIFFNESS, paper_set
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from contactfpga.design.cover import elastic
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.impact import COMPRESSION_TIME
 from contactfpga_sim.lab.arm.case import Case
@@ -33,7 +34,7 @@ def oracle():
 
 
 def test_the_set_has_the_stiffness_and_inertia_it_states():
-    assert PAPER.foam.stiffness == pytest.approx(STIFFNESS, abs=0.005)
+    assert elastic.stiffness(PAPER.foam.half_space.ball) == pytest.approx(STIFFNESS, abs=0.005)
     assert PAPER.link.inertia_kgm2 == pytest.approx(Arm.link(0.6, 0.038, 0.15, 0.2).inertia_kgm2, rel=1e-12)
     assert PAPER.motor.torque_nm_a * PAPER.motor.current_a == pytest.approx(3.0)
 

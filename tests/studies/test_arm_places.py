@@ -2,56 +2,53 @@
 
 import itertools
 import json
-import math
 
 import numpy as np
 import pytest
-from arm_oracle import STIFFNESS, paper_set
-from scipy.optimize import brentq
+from arm_oracle import Layers, paper_set
 from scipy.stats import binom
 
-from contactfpga.design.cover import Ball, cells_of
+from contactfpga.design.cover import BODIES, Cap, Cover, Switch, cells_of
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import result_cache
 from contactfpga_sim.lab.arm import anywhere, places
-from contactfpga_sim.lab.arm.anywhere import BEST, GEOMETRIES, PAPER, WAYS, Geometry
+from contactfpga_sim.lab.arm.anywhere import BEST, FLUSH, GEOMETRIES, WAYS, Geometry
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Peaks
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.arm.world import Switches, pressed
+from contactfpga_sim.lab.arm.world import Switches, shares
 
 RUN = {"step_s": 25e-6, "lead_s": 0.25e-3, "duration_s": 0.03}
-RIGID = {"spread": 0.0, "travel_m": 0.0}
 
 
 def tiled(pitch_mm=6.4):
     return Skin(pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm)
 
 
-def tile_closes_n(x_mm, y_mm, pitch_mm, threshold_n):
-    """Force at which Hertz's pressure on the square tile around (0, 0) mm adds up to the threshold, point by point."""
-    middles = (np.arange(600) + 0.5) / 600 * pitch_mm - pitch_mm / 2
-    r2 = 1e-6 * np.add.outer((middles - y_mm) ** 2, (middles - x_mm) ** 2)
-
-    def above(force):
-        a2 = (0.75 * force * 0.038 / (0.75 * STIFFNESS / math.sqrt(0.038))) ** (2 / 3)
-        pressure = 1.5 * force / (math.pi * a2) * np.sqrt(np.maximum(0.0, 1 - r2 / a2))
-        return pressure.sum() * (1e-3 * pitch_mm / 600) ** 2 - threshold_n
-
-    return brentq(above, threshold_n / 2, 40.0)
+SOFT = "forearm", (15e-3, 40e3)
 
 
-@pytest.mark.parametrize(("x_mm", "y_mm"), [(0.0, 0.0), (2.0, 1.3), (3.1, 3.1)])
-def test_a_touch_off_a_switch_under_tiles_against_a_second_integration(x_mm, y_mm):
-    case = BEST.case().but(switch=RIGID, touch=({"x_mm": 7 * 6.4 + x_mm, "y_mm": 7 * 6.4 + y_mm},), run=RUN)
-    found = run(case, "latency", latency_s=2.1e-3, skin=tiled())
-    closing = tile_closes_n(x_mm, y_mm, 6.4, 0.4)
-    assert found.course["force_n"][found.course["closed"].argmax()] == pytest.approx(closing, rel=0.05)
-    again = paper_set(force_to_close=closing, latency=2.1e-3)
-    assert found.outcome.closes_s == pytest.approx(again.closes_s, abs=50e-6)
-    assert found.outcome.reacts_s == pytest.approx(again.reacts_s, abs=1e-9)
-    assert found.outcome.peak_force_n == pytest.approx(again.peak_force_n, rel=2e-3)
+@pytest.mark.parametrize(("x_mm", "y_mm"), [(0.0, 0.0), (3.1, 2.6)])
+@pytest.mark.parametrize(
+    ("body", "flesh", "foam"),
+    [("rigid", None, (2e-3, 1.16e5)), ("rigid", None, (5e-3, 3.45e5)), (*SOFT, (2e-3, 1.16e5))],
+)
+def test_a_touch_off_a_switch_under_tiles_against_a_second_integration(body, flesh, foam, x_mm, y_mm):
+    """Stopped by a switch, between two samples, and the rigid ones also by the torque limit alone."""
+    layers = Layers((foam[0], foam[1] * (5.8 / 6.4) ** 2), flesh, 0.4 / 0.2e-3 / 6.4e-3**2)
+    cover = Cover("foam", foam[0], Switch(0.4, travel_m=0.2e-3), cap=Cap(5.8e-3), cut=True, modulus_pa=foam[1])
+    place = {"x_mm": 7 * 6.4 + x_mm, "y_mm": 7 * 6.4 + y_mm}
+    case = Case.load("paper").wearing(cover).but(body=body, touch=(place,), run=RUN)
+    closing = layers.tile_closes_n(x_mm, y_mm, 6.4, 0.4)
+    before, period = run(case, "torque", skin=tiled(), to_peak=True).outcome, case.control.period_s
+    latency_s = (before.closes_s // period + 9.5) * period - before.closes_s
+    found = run(case, "latency", latency_s=latency_s, skin=tiled(), to_peak=True).outcome
+    for ours, late in ((found, latency_s), *([(before, 1.0)] if body == "rigid" else [])):
+        again = paper_set(closing, late, force=layers)
+        assert ours.closes_s == pytest.approx(again.closes_s, abs=50e-6)
+        assert ours.reacts_s == pytest.approx(again.reacts_s, abs=1e-9)
+        assert ours.peak_force_n == pytest.approx(again.peak_force_n, rel=0.01)
 
 
 @pytest.mark.parametrize("face", ["flush, point force", "buttons", "tiles"])
@@ -61,7 +58,7 @@ def test_a_lower_threshold_raises_no_touchs_peak(face):
         case = Geometry(face, 10.0, threshold, 5.0).case()
         (found,) = places._touched(places.Batch(case, Skin(), ((0.8e-3,),), 4, 0))
         forces.append([force for force, _, _ in found])
-    assert all((np.array(lower) <= np.array(higher) + 1e-9).all() for higher, lower in itertools.pairwise(forces))
+    assert all((np.array(lower) <= 1.005 * np.array(higher)).all() for higher, lower in itertools.pairwise(forces))
     assert np.mean(forces[2]) < np.mean(forces[0]) - 0.5
 
 
@@ -91,10 +88,12 @@ def test_a_run_to_its_peak_has_the_whole_runs_peak():
 
 def test_forces_between_those_looked_at_follow_the_cells_themselves():
     case = Geometry("flush", 10.0, 1.0, 5.0).case().but(touch=({"x_mm": 83.0, "y_mm": 81.0},))
-    switches, ball = Switches(case, Skin()), Ball(0.038, 3.45e5 / 0.75)
+    switches, cells = Switches(case, Skin()), cells_of(case.cover, 16, 16, 0.01, 0.01)
+    rigid = BODIES["rigid"]
+    indentation = cells.indentation([rigid.ball(0.038)], rigid)
     for force in (0.5, 3.33, 17.1):
         found = switches.forces_n((force,))
-        exact = force * pressed(cells_of(case.cover, 16, 16, 0.01, 0.01), 83.0, 81.0, ball.patch_m(force))
+        exact = force * shares(cells, indentation, 83.0, 81.0, force)
         assert found == pytest.approx(exact, abs=2e-3 * exact.max())
 
 
@@ -106,6 +105,7 @@ def halves(first, second, limited=0.0):
 def test_a_worst_value_that_another_seed_changes_gives_way_to_a_quantile():
     even = np.linspace(5.0, 10.0, 60)
     assert anywhere.worst_text(halves(even, even + 0.2)) == "10.2"
+    assert anywhere.peak_text(halves(even, even + 1000)) == "solid"
     found = anywhere.worst_text(halves(even, np.append(even[:-1], 12.0)))
     values = np.sort([*even, *even[:-1], 12.0])
     low, high = (values[int(binom.ppf(share, 120, 0.95)) - 1 + after] for share, after in ((0.025, 0), (0.975, 1)))
@@ -127,18 +127,18 @@ def made_up(newtons):
 
 
 def test_the_sentence_names_what_takes_the_most():
-    latency = {(PAPER, "6 ms"): 18.0, (PAPER, "pin"): 14.0}
-    for name, value, word in (("face", "tiles", "face"), ("threshold_n", 0.2, "threshold"), ("pitch_mm", 6.4, "pitch")):
-        found = made_up({PAPER._replace(**{name: value}): 10.0} | latency)
-        assert f"What matters most is the {word}" in anywhere.matters(found)
-        assert "-5.0 N" in anywhere.matters(found)
-    assert "What matters most is the latency: pin" in anywhere.matters(made_up(latency))
+    latency = {(FLUSH, "6 ms"): 18.0, (FLUSH, "pin"): 14.0}
+    for field, value, what in (("face", "tiles", "face: tiles"), ("threshold_n", 0.2, "threshold: 0.2")):
+        found = anywhere.matters(made_up({FLUSH._replace(**{field: value}): 10.0} | latency))
+        assert f"What matters most against a rigid body is the {what} -5.0 N in" in found
+        assert "latency pin -4.0 N" in found
+    assert "rigid body is the latency: pin -4.0 N" in anywhere.matters(made_up(latency))
 
 
 def test_cut_foam_and_a_cap_come_from_a_file(tmp_path):
     path = tmp_path / "tiles.toml"
     path.write_text(
-        'like = "paper"\nmodel = "frictionless"\n[foam]\ncut = true\n[cap]\nside_m = 0.0058\n'
+        'like = "paper"\nmodel = "foam"\n[foam]\ncut = true\n[cap]\nside_m = 0.0058\n'
         "[switch]\nforce_n = 0.4\ntravel_m = 0.2e-3\nspread = 0.1\n"
     )
     assert Case.load(path) == BEST.case().but(cap={"side_m": 0.0058})

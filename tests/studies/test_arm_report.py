@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from study_pages import section
 
+from contactfpga.design import kits
+from contactfpga.design.cover import load_cover
 from contactfpga.tools import cli
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import comply, report, tables
@@ -53,6 +55,19 @@ def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_befo
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
 
 
+def test_a_skin_brings_its_own_cover_and_no_columns_of_the_paper(monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(report, "columns", lambda *given: asked.append(given))
+    monkeypatch.setattr(report, "as_json", lambda *given: {})
+    path = kits.kit("starter").skin_path
+    assert cli.main(["study", "arm", "--json", "--places", "0", "--skin", str(path), "--body", "forearm"]) == 0
+    ((case, name, _, skin),) = asked
+    assert (case.cover, case.body, skin.pitch_x_mm) == (load_cover(path), "forearm", 6.4)
+    assert name == f"paper under {path} against forearm"
+    assert cli.main(["study", "arm", "--json", "--body", "forearm"]) == 1
+    assert "the model 'point' knows rigid ones alone" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_the_columns_are_what_they_are_called(found):
     assert list(found) == ["6 ms", "UART", "pin", "limit alone", "at 12 N, 6 ms", "at 12 N, no limit"]
@@ -84,9 +99,9 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
         ('like = "paper"\n[arm]\n', "unknown part 'arm'"),
         ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
         ('like = "paper"\n[foam]\ncut = true\n', "the model 'point' knows no cut"),
-        ('like = "paper"\nmodel = "hertz"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
-        ('like = "paper"\nmodel = "hertz"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
-        ('like = "paper"\nmodel = "hertz"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
+        ('like = "paper"\nmodel = "foam"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
+        ('like = "paper"\nmodel = "foam"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
+        ('like = "paper"\nmodel = "foam"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
         ('like = "paper"\n[cap]\nside = 1\n', "unknown key 'side' in [cap]"),
         ('like = "paper"\n[control]\nbehavior = "flee"\n', "behavior is 'flee'; it must be one of reverse, comply"),
         (
@@ -145,4 +160,4 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert section("arm.md", "set") == writer.spelled(str(tables.set_table(tables.ArmRuns(None, {}, found, {}))))
+    assert section("arm.md", "set") == writer.spelled(str(tables.set_table(tables.ArmRuns(None, {}, found, {}, {}))))

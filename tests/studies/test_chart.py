@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.stats import binomtest
 from study_pages import outdated
 
-from contactfpga.design.cover import Cells
+from contactfpga.design.cover import BODIES, Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.apps import errors, result_cache, speed, stats
@@ -166,10 +166,11 @@ def test_a_point_is_what_other_code_finds():
     cells = Cells(one.cover, 16, 16, 0.01, 0.01)
     counted, missed, away = [], [], []
     for scene in placements("fingers", 60, 3, skin):
-        closed = cells.forces_n(scene.loads(0.0)) >= cells.thresholds_n
+        pressed = scene.on_cover(skin, one.cover)  # its patches may reach over the sheet's edge
+        closed = cells.forces_n(pressed.loads(0.0)) >= cells.drawn(pressed.drawn)
         labels, count = ndimage.label(closed)
         found = [(pitch * x, pitch * y) for y, x in ndimage.center_of_mass(closed, labels, range(1, count + 1))]
-        there = [(contact.x_mm, contact.y_mm) for contact in scene.contacts]
+        there = [(contact.x_mm, contact.y_mm) for contact in pressed.truth(0.0, skin).contacts]
         few, many = sorted((found, there), key=len)
         counted.append(count != len(there))
         missed.append(1 - min(count, len(there)) / len(there))
@@ -184,13 +185,14 @@ def test_a_point_is_what_other_code_finds():
 
 
 def test_a_switch_closes_when_the_force_on_its_tile_has_risen_to_its_own():
-    """A disc that lies on one tile alone: F (t / T)^(3/2) = threshold."""
+    """A disc that lies on one tile alone, as deep as its layers are at that force."""
     _, cover = METHODS["run, 20 mm, tiles"]
-    scene = Scene((contacts.Contact(shape=contacts.disc(6.0), x_mm=60.0, y_mm=40.0, force_n=5.0),)).approaching(100.0)
-    seconds, cells = times.closing(scene, SMALL, cover)
-    threshold = Cells(cover, 8, 8, 0.02, 0.02).thresholds_n[2, 3]
-    risen = 0.75 * 5.0 / (contacts.BODY_PA * 6e-3) / 0.1
-    assert seconds == pytest.approx(risen * (threshold / 5.0) ** (2 / 3), abs=2 * risen / 2**times.HALVINGS)
+    disc = contacts.disc(6.0)
+    scene = Scene((contacts.Contact(shape=disc, x_mm=60.0, y_mm=40.0, force_n=5.0, speed_mm_s=100.0),))
+    seconds, cells = times.closing(scene.on_cover(SMALL, cover), SMALL, cover)
+    sheet = Cells(cover, 8, 8, 0.02, 0.02)
+    depth_m = sheet.indentation(disc, BODIES["finger"]).depth_m(sheet.thresholds_n[2, 3])
+    assert seconds == pytest.approx(depth_m / 0.1, abs=1e-3 / 2**times.HALVINGS * 100)
     ((late, pressed),) = cells
     assert late == 0
     assert np.argwhere(pressed).tolist() == [[2, 3]]
@@ -198,7 +200,7 @@ def test_a_switch_closes_when_the_force_on_its_tile_has_risen_to_its_own():
 
 def test_a_touch_takes_mechanics_and_electronics():
     skin, cover = METHODS["run, 10 mm, tiles"]
-    scenes = touches("fingers", 12, 5, skin)
+    scenes = touches("fingers", 12, 5, skin, cover)
     raw = times.measured(scenes, skin, cover, 0, 0)
     first = [times.closing(scene, skin, cover)[0] for scene in scenes]
     np.testing.assert_allclose(np.subtract(raw["touch"], raw["electric"]), np.multiply(first, 1e6))
@@ -211,8 +213,12 @@ def test_a_touch_takes_mechanics_and_electronics():
 
 def test_a_touch_that_closes_nothing_takes_forever():
     skin, cover = METHODS["run, 10 mm, paper"]
-    light = Scene((contacts.Contact(shape=contacts.disc(6.0), x_mm=60.0, y_mm=40.0, force_n=0.2),)).approaching(100.0)
-    firm = Scene((contacts.Contact(shape=contacts.disc(6.0), x_mm=60.0, y_mm=40.0, force_n=60.0),)).approaching(100.0)
+    light, firm = (
+        Scene(
+            (contacts.Contact(shape=contacts.disc(6.0), x_mm=60.0, y_mm=40.0, force_n=force, speed_mm_s=100.0),)
+        ).on_cover(skin, cover)
+        for force in (0.2, 60.0)
+    )
     found = times.summed([times.measured([light, firm, light], skin, cover, 0, 0)], skin)
     assert math.isinf(found.touch_median_us.value)
     assert found.electric_median_us.value < 1000
@@ -222,7 +228,7 @@ def test_a_touch_that_closes_nothing_takes_forever():
 @pytest.mark.slow
 def test_switches_that_close_one_after_the_other_go_through_the_gateware(monkeypatch):
     skin, cover = METHODS["run, 20 mm, tiles"]
-    scenes = touches("edge", 3, 5, skin)
+    scenes = touches("edge", 3, 5, skin, cover)
     assert max(len(times.closing(scene, skin, cover)[1]) for scene in scenes) > 1
     times.measured(scenes, skin, cover, 0, checked=3)
     monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: predict(skin.replace(settle_us=6.0), *rest))

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from study_pages import cells, section
+from study_pages import section
 
 from contactfpga.design.cover import Ball, Cap, Cover
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M
@@ -19,23 +19,13 @@ def test_errors_of_the_models_are_up_to_date():
     assert section("cover.md", "sense") == RUN.text("sense")
 
 
-def test_the_largest_errors_against_the_boundary_elements_are_those_that_the_page_states():
-    rows = [[float(cell.split()[0]) for cell in row] for row in cells(section("paper.md", "elements"))[2:]]
-    assert len(rows) == len(caps.THICKNESSES_MM) * len(caps.SIDES_MM)
-    assert max(abs(flush) for _, _, flush, *_ in rows) < 2
-    assert all(abs(error) < 13 for _, side, _, *errors in rows for error in errors if side >= 6)
-    assert max(rigid for _, side, _, rigid, _ in rows if side == 4) > 20
-    error = caps._off(5.0, 8.0, math.inf, proud=False)
-    assert f"{100 * error:+.1f} %" == cells(section("paper.md", "elements"))[2 + 6][2]
-
-
 def test_a_strip_sags_as_a_clamped_beam_does():
     """Ten times as thick, it shears alone; ten times as long, it bends."""
-    thick = Cover("frictionless", 0.1, cap=Cap(5e-3), poisson=0.0, modulus_pa=1e5)
-    thin = Cover("frictionless", 1e-4, cap=Cap(5e-3), poisson=0.0, modulus_pa=1e5)
+    thick = Cover("foam", 0.1, cap=Cap(5e-3), modulus_pa=1e5)
+    thin = Cover("foam", 1e-4, cap=Cap(5e-3), modulus_pa=1e5)
     pressed = math.pi / 4 * LENGTH_M * WIDTH_M
-    by_shear = 1e-4 / (6 / 5 * 5e-3**2 / (8 * 5e4 * 0.1))
-    by_bending = 1e-4 / (5e-3**4 / (32 * 1e5 * 1e-4**3))
+    by_shear = 1e-4 / (6 / 5 * 5e-3**2 / (8 * 1e5 / 2.4 * 0.1))
+    by_bending = 1e-4 / (5e-3**4 / (32 * 1e5 / 0.96 * 1e-4**3))
     assert caps.sagging_n(thick, 10e-3, 1e-4) == pytest.approx(by_shear * pressed, rel=0.01)
     assert caps.sagging_n(thin, 10e-3, 1e-4) == pytest.approx(by_bending * pressed, rel=0.01)
 

@@ -1,5 +1,6 @@
 """Pitch and cover of `contactfpga fit`: against a search that tries everything, and against binomial chances."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -8,7 +9,8 @@ from fits import chosen
 from scipy import ndimage
 from scipy.stats import binom
 
-from contactfpga.design.cover import Cells, Ellipse, Load, load_cover
+from contactfpga.design.cover import Cells, Ellipse, Switch, load_cover
+from contactfpga.design.cover.felt import BODY, Touch
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import stats
@@ -107,20 +109,17 @@ def test_a_race_ends_as_soon_as_a_limit_is_surely_met_or_missed():
 
 
 def test_a_fingertip_is_felt_where_the_least_closing_force_is_reached():
-    """Without spread a place is felt from min(closing force / force on a switch at 1 N) on: forces are linear."""
-    cover = tiled(10.0)
-    cover = type(cover)(**{**vars(cover), "switch": type(cover.switch)(force_n=0.4)})
-    cells = Cells(cover, 9, 9, 0.01, 0.01)
+    """Without spread as `cover felt` says, which other tests judge."""
+    cover = dataclasses.replace(tiled(10.0), switch=Switch(0.4))
     for force, expected in ((0.39, 1.0), (8.0, 0.0)):
         assert set(faces.unfelt(cover, (10.0, 10.0), force, range(20))) == {expected}
-    rng = np.random.default_rng(1)
-    least = []
-    for x, y in rng.uniform(35e-3, 45e-3, (400, 2)):
-        forces = cells.forces_n([Load((Ellipse(6e-3, 5e-3, x, y, rng.uniform(0, math.pi)),), 1.0)])
-        least.append(0.4 / forces.max())
+    cells, rng = Cells(cover, 9, 9, 0.01, 0.01), np.random.default_rng(1)
+    touch = Touch(cells, Ellipse(6e-3, 5e-3), BODY)
+    places = zip(*rng.uniform(35e-3, 45e-3, (2, 400)), rng.uniform(0, math.pi, 400))
+    least = np.array([touch.closing_n(cells.thresholds_n[None], *place)[0][0] for place in places])
     for force in (0.6, 0.8, 1.0):
         share = np.mean(faces.unfelt(cover, (10.0, 10.0), force, range(50)))
-        assert share == pytest.approx(np.mean(np.array(least) > force), abs=4 * 0.5 / math.sqrt(400) * math.sqrt(2))
+        assert share == pytest.approx(np.mean(least > force), abs=4 * 0.5 / math.sqrt(400) * math.sqrt(2))
 
 
 def test_the_answers_file_has_the_cover_that_was_chosen(file, tmp_path, shortcuts, monkeypatch):

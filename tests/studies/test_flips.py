@@ -98,7 +98,7 @@ def test_a_board_returns_to_a_moment(plain):
 
 @pytest.fixture(scope="module")
 def fast():
-    yield from made(campaign.skin("run, on_change, reversal"))
+    yield from made(campaign.skin("run").replace(send="on_change", scan="reversal", precharge_us=0.5))
 
 
 @pytest.mark.slow  # which has a board of its own to compile

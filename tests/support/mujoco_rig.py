@@ -9,7 +9,7 @@ from contactfpga.robot.body import Body
 BALL_M = 0.01
 TILES = """
 [cover]
-model = "frictionless"
+model = "foam"
 thickness_m = 0.003
 [cover.cap]
 side_m = {side}

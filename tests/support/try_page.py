@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from contactfpga.design.cover import BODIES, Ellipse, Load
+
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "docs/try"
 NODE = shutil.which("node")
@@ -36,3 +38,11 @@ def node(script: str, *arguments: str, given: str, timeout: float = 200) -> str:
 def kit() -> str:
     """What the page's scripts know of the kit, as JSON."""
     return json.dumps(assemble.facts())
+
+
+def load(cells, finger):
+    """How a finger of the page presses cells."""
+    half_m = finger["radius_mm"] * 1e-3
+    pressed = cells.indentation([Ellipse(half_m, half_m)], BODIES["finger"])
+    (part,) = pressed.parts_at(pressed.depth_m(finger["force_n"]))
+    return Load((part.placed(finger["x_mm"] * 1e-3, finger["y_mm"] * 1e-3, 0.0),), finger["force_n"])

@@ -66,9 +66,11 @@ def test_a_recording_with_a_threshold_leaves_the_mouse_its_cover(tmp_path):
 
 
 def test_the_scene_that_pushes_closes_switches_where_its_force_is():
-    """18 N on one finger, 2 N, too few for one this wide, on the other; half a second later the other way round."""
+    """18 N on one finger, which covers many switches, and 2 N on the other; half a second later the other way round."""
     with board_at(f"sim://?scene=pushing&skin={TILES}") as board:
         board.advance(board.skin.clock_hz // 2)
-        assert [part.any() for part in (board.pressed[:8], board.pressed[8:])] == [True, False]
+        hard, light = (part.sum() for part in (board.pressed[:8], board.pressed[8:]))
+        assert hard > 4 * light > 0
         board.advance(1)
-        assert [part.any() for part in (board.pressed[:8], board.pressed[8:])] == [False, True]
+        light, hard = (part.sum() for part in (board.pressed[:8], board.pressed[8:]))
+        assert hard > 4 * light > 0

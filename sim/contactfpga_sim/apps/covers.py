@@ -21,17 +21,17 @@ def bare(pitch_mm: float) -> Cover | None:
 
 def paper(pitch_mm: float) -> Cover:
     """The paper's switch, 1 N on a face of 12.6 mm2, flush under 5 mm of foam glued on a rigid base."""
-    return Cover("bonded", 5e-3, Switch())
+    return Cover("foam", 5e-3, Switch())
 
 
 def capped(pitch_mm: float, switch: Switch = DOME) -> Cover:
     """Proud caps under whole foam."""
-    return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3))
+    return Cover("foam", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3))
 
 
 def tiled(pitch_mm: float, switch: Switch = DOME) -> Cover:
     """Proud caps, each under its own foam tile."""
-    return Cover("frictionless", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3), cut=True)
+    return Cover("foam", FOAM_M, switch, cap=Cap((pitch_mm - GAP_MM) * 1e-3), cut=True)
 
 
 COVERS: dict[str, Callable[[float], Cover | None]] = {

@@ -69,7 +69,8 @@ def contacts(truth: Truth) -> list[Blob]:
 
 
 def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
-    return scene.pressed(seconds, skin, cover), contacts(scene.truth(seconds, skin))
+    on = scene.on_cover(skin, cover)
+    return on.pressed(seconds, skin, cover), contacts(on.truth(seconds, skin))
 
 
 def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:

@@ -8,19 +8,24 @@ from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.cells import Cells, cells_of
 from contactfpga.design.cover.felt import Felt, Sheet, feel
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.layers import BODIES, Body, Indentation
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.press import MODELS, Cap, Cover, Load, load_cover
+from contactfpga.design.cover.press import MODELS, Cap, Cover, Indenter, Load, load_cover
 
 __all__ = [
+    "BODIES",
     "MODELS",
     "Ball",
+    "Body",
     "Cap",
     "Cells",
     "Cover",
     "CoverError",
     "Ellipse",
     "Felt",
+    "Indentation",
+    "Indenter",
     "Load",
     "NoSolution",
     "Part",

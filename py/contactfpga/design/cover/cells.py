@@ -20,8 +20,10 @@ import numpy as np
 
 from contactfpga.design.cover import medium, point
 from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
+from contactfpga.design.cover.layers import Body
 from contactfpga.design.cover.numerics import Floats
-from contactfpga.design.cover.press import Cover, Load
+from contactfpga.design.cover.patch import Part
+from contactfpga.design.cover.press import Cover, Indenter, Load
 
 LEAST_PARTS, MOST_PARTS = 8, 24
 """Limits of grid steps per pitch; between them, two per foam thickness and six per face."""
@@ -29,8 +31,11 @@ LEAST_PARTS, MOST_PARTS = 8, 24
 MOST_PITCHES = 20
 """Largest foam thickness in pitches; forces are equal on all switches long before."""
 
-BEYOND = 4.0
-"""Computed foam beyond the sheet, in thicknesses."""
+BEYOND, MARGIN = 4.0, 2.0
+"""Computed foam beyond a part, and beyond those switches, in thicknesses."""
+
+NEIGHBORS = 4
+"""Computed switches beyond that, as yielding caps pass force on."""
 
 
 class Cells:
@@ -54,14 +59,14 @@ class Cells:
         self.cover = cover
         self.shape = (rows, columns)
         self._x, self._y = np.arange(columns) * pitch_x_m, np.arange(rows) * pitch_y_m
-        self._axes = [_Axis(count, pitch, cover) for count, pitch in ((rows, pitch_y_m), (columns, pitch_x_m))]
+        self._pitches = pitch_y_m, pitch_x_m
         self.thresholds_n = self.drawn(seed)
         """(rows, columns) closing force of each switch less its preload."""
 
     @property
     def parts(self) -> int:
         """Steps per pitch of the pressure grid, along the columns."""
-        return self._axes[1].parts
+        return _axis(1, self._pitches[1], self.cover).parts
 
     def drawn(self, seed: int) -> Floats:
         """(rows, columns) closing force in N of each switch drawn with this seed, less its preload."""
@@ -69,14 +74,34 @@ class Cells:
         drawn = np.random.default_rng(seed).standard_normal(self.shape) if switch.spread else np.zeros(self.shape)
         return np.asarray(switch.force_n * (1 + switch.spread * np.clip(drawn, -3, 3)) - switch.preload_n)
 
+    def indentation(self, parts: Sequence[Part], body: Body) -> Indenter:
+        """A body's parts on these switches' cover."""
+        pitch_y_m, pitch_x_m = self._pitches
+        return self.cover.indentation(parts, body, pitch_x_m, pitch_y_m)
+
     def forces_n(self, loads: Sequence[Load]) -> Floats:
         """(rows, columns) force on each switch, summed over loads; below 0 where foam is pulled off."""
         if self.cover.model == "point":
             return self._of_points(loads)
-        down, across = self._axes
-        stress = self._spread(self._pressure(loads))
-        taken: Floats = across.take(down.take(stress).T).T
-        return self._given_way(taken) if self.cover.gives_way else taken
+        found = np.zeros(self.shape)
+        for part, force in (share for load in loads for share in load.shares()):
+            (top, rows), (left, columns) = (
+                self._window(*place)
+                for place in zip((part.y_m, part.x_m), part.half_box_m[::-1], self._pitches, self.shape)
+            )
+            if rows and columns:
+                grid = _grid(self.cover, rows, columns, *self._pitches)
+                found[top : top + rows, left : left + columns] += force * grid.shares(part, top, left)
+        return found
+
+    def _window(self, middle_m: float, reach_m: float, pitch_m: float, count: int) -> tuple[int, int]:
+        """First of the switches that a part may press along one direction, and their number."""
+        beyond = 0.0 if self.cover.cut else BEYOND * self.cover.thickness_m
+        more = 1 + NEIGHBORS * self.cover.gives_way
+        wanted = 2 * (math.ceil((reach_m + beyond) / pitch_m) + more) + 1
+        first = min(max(round(middle_m / pitch_m) - wanted // 2, 0), max(0, count - wanted))
+        near = abs(middle_m - (count - 1) / 2 * pitch_m) <= count / 2 * pitch_m + reach_m + beyond
+        return first, min(wanted, count) if near else 0
 
     def closed(self, loads: Sequence[Load], before: np.ndarray | None = None) -> np.ndarray:
         """(rows, columns) bool: the closed switches. Those closed ``before`` open only below the closing force less
@@ -97,7 +122,7 @@ class Cells:
         finite("acceleration_m_s2", acceleration_m_s2)
         not_negative("foam_kg_m3", foam_kg_m3, "kg/m3")
         cap = self.cover.cap
-        tile = math.prod(self.cover.width_m(axis.pitch_m) for axis in self._axes)
+        tile = math.prod(self.cover.width_m(pitch) for pitch in self._pitches)
         mass = (cap.mass_kg if cap else 0.0) + foam_kg_m3 * tile * self.cover.thickness_m
         switch = self.cover.switch
         margin = switch.force_n - switch.preload_n - mass * acceleration_m_s2
@@ -113,49 +138,67 @@ class Cells:
             forces += self.cover.area_m2 * point.stress_pa(force, away, self.cover.thickness_m)
         return forces
 
-    def _pressure(self, loads: Sequence[Load]) -> Floats:
-        down, across = self._axes
+
+class _Grid:
+    """The stress grid of a window of switches."""
+
+    def __init__(self, cover: Cover, rows: int, columns: int, pitch_y_m: float, pitch_x_m: float):
+        self._cover = cover
+        self._down, self._across = _axis(rows, pitch_y_m, cover), _axis(columns, pitch_x_m, cover)
+
+    def shares(self, part: Part, top: int, left: int) -> Floats:
+        """(rows, columns) share of the part's force on each switch, the first one of which is number ``top``, ``left``
+        of the sheet."""
+        stress = self._spread(self._pressure(part, top * self._down.pitch_m, left * self._across.pitch_m))
+        taken: Floats = self._across.take(self._down.take(stress).T).T
+        return self._given_way(taken) if self._cover.gives_way else taken
+
+    def _pressure(self, part: Part, top_m: float, left_m: float) -> Floats:
+        down, across = self._down, self._across
         found = np.zeros((len(down.places_m), len(across.places_m)))
-        for part, force in (share for load in loads for share in load.shares()):
-            reach_x, reach_y = part.half_box_m
-            rows, columns = down.near(part.y_m, reach_y), across.near(part.x_m, reach_x)
-            if rows.start >= rows.stop or columns.start >= columns.stop:
-                continue
-            x, y = across.places_m[columns], down.places_m[rows, None]
-            here = part.density(x, y) * down.step_m * across.step_m
-            if down.holds(part.y_m, reach_y) and across.holds(part.x_m, reach_x):
-                total = here.sum()
-                if not total:  # smaller than a part of the grid
-                    here = np.zeros(here.shape)
-                    here[np.abs(y[:, 0] - part.y_m).argmin(), np.abs(x - part.x_m).argmin()] = total = 1.0
-                here = here / total
-            found[rows, columns] += force * here
+        (reach_x, reach_y), x_m, y_m = part.half_box_m, part.x_m - left_m, part.y_m - top_m
+        rows, columns = down.near(y_m, reach_y), across.near(x_m, reach_x)
+        if rows.start >= rows.stop or columns.start >= columns.stop:
+            return found
+        x, y = across.places_m[columns] + left_m, down.places_m[rows, None] + top_m
+        here = part.density(x, y) * down.step_m * across.step_m
+        if down.holds(y_m, reach_y) and across.holds(x_m, reach_x):
+            total = here.sum()
+            if not total:  # smaller than a part of the grid
+                here = np.zeros(here.shape)
+                here[np.abs(y[:, 0] - part.y_m).argmin(), np.abs(x - part.x_m).argmin()] = total = 1.0
+            here = here / total
+        found[rows, columns] = here
         return found
 
     def _spread(self, pressure: Floats) -> Floats:
         """Force on each grid part below the foam, periodic far beyond the edge."""
-        if self.cover.cut:
+        if self._cover.cut:
             return pressure
         return np.fft.irfft2(np.fft.rfft2(pressure) * self._transfer, s=pressure.shape)
 
     @functools.cached_property
     def _transfer(self) -> Floats:
-        down, across = self._axes
+        down, across = self._down, self._across
         waves = (
             2 * np.pi * np.fft.fftfreq(len(down.places_m), down.step_m),
             2 * np.pi * np.fft.rfftfreq(len(across.places_m), across.step_m),
         )
-        number = np.hypot(waves[0][:, None], waves[1])
-        return medium.transfer(self.cover.within, number * self.cover.thickness_m)
+        return medium.foam(np.hypot(waves[0][:, None], waves[1]) * self._cover.thickness_m)
 
     def _given_way(self, taken: Floats) -> Floats:
-        down, across = self._axes
+        down, across = self._down, self._across
         (values_y, modes_y), (values_x, modes_x) = down.modes, across.modes
-        strip, switch = self.cover.strip_pa, self.cover.switch
+        strip, switch = self._cover.strip_pa, self._cover.switch
         stiff_y, stiff_x = strip(down.pitch_m) * across.pitch_m, strip(across.pitch_m) * down.pitch_m
         share = (stiff_y * values_y[:, None] + stiff_x * values_x) * switch.travel_m / switch.force_n
         found: Floats = modes_y @ ((modes_y.T @ taken @ modes_x) / (1 + share)) @ modes_x.T
         return found
+
+
+@functools.lru_cache(maxsize=256)
+def _grid(cover: Cover, rows: int, columns: int, pitch_y_m: float, pitch_x_m: float) -> _Grid:
+    return _Grid(cover, rows, columns, pitch_y_m, pitch_x_m)
 
 
 class _Axis:
@@ -167,7 +210,7 @@ class _Axis:
         finest = [pitch_m if width == pitch_m else width / 6, pitch_m if cover.cut else cover.thickness_m / 2]
         self.parts = min(MOST_PARTS, max(LEAST_PARTS, math.ceil(pitch_m / min(finest))))
         self.step_m = pitch_m / self.parts
-        beyond = 1 if cover.cut else 1 + math.ceil(BEYOND * cover.thickness_m / pitch_m)
+        beyond = 1 if cover.cut else 1 + math.ceil(MARGIN * cover.thickness_m / pitch_m)
         self.places_m = (np.arange((count + 2 * beyond) * self.parts) + 0.5) * self.step_m - (beyond + 0.5) * pitch_m
         shares = self._taken(cover.width_m(pitch_m))
         self._near = (shares != 0).argmax(axis=1)[:, None] + np.arange(np.count_nonzero(shares, axis=1).max())
@@ -195,6 +238,11 @@ class _Axis:
         away = self.places_m - np.arange(self.count)[:, None] * self.pitch_m
         upper, lower = (np.clip(away + side * self.step_m / 2, -width_m / 2, width_m / 2) for side in (1, -1))
         return np.asarray((upper - lower) / self.step_m)
+
+
+@functools.lru_cache(maxsize=256)
+def _axis(count: int, pitch_m: float, cover: Cover) -> _Axis:
+    return _Axis(count, pitch_m, cover)
 
 
 @functools.lru_cache(maxsize=32)

@@ -12,11 +12,12 @@ import numpy as np
 
 from contactfpga.design.cover import arm, elastic, impact, sense
 from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.foams import Foam
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
 from contactfpga.design.cover.region import Pressing, RegionLimits, limits_of
 from contactfpga.design.cover.sense import PaddedSheet, Sense
-from contactfpga.design.cover.task import Foam, Task
+from contactfpga.design.cover.task import Task
 from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"

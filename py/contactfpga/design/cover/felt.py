@@ -1,6 +1,7 @@
-"""Whether a light finger, an ellipse with Hertz's pressure, is felt anywhere on a sheet.
+"""From which force on a finger is felt anywhere on a sheet.
 
-A touch is felt from the least ratio of closing force to force share on.
+A switch's share of the force falls as the patch grows. Around the force that closes the first switch it is taken as a
+power of the force.
 """
 
 from __future__ import annotations
@@ -12,13 +13,20 @@ from collections.abc import Collection
 import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, NoSolution, positive
-from contactfpga.design.cover.cells import BEYOND, Cells
+from contactfpga.design.cover.cells import Cells
+from contactfpga.design.cover.layers import BODIES, Body
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.patch import Ellipse
 from contactfpga.design.cover.press import Cover, Load
 
 LENGTH_M, WIDTH_M = 12e-3, 10e-3
-"""Length and width of a light fingertip's contact."""
+"""Length and width of a fingertip's contact at its body's depth."""
+
+BODY = BODIES["finger"]
+
+ROUNDS, APART, LEAST_RISE = 3, 1.25, 0.2
+"""Estimates of the force from the shares at the estimate before; ratio of the forces that tell the power, and its
+least."""
 
 PLACES, MOST_PLACES = 2000, 100_000
 SHEETS = 40
@@ -27,9 +35,6 @@ probability."""
 
 LEAST_SHARE = 1e-4
 """Force share that counts as unpressed; a layer's linear solution has ripples far away."""
-
-NEIGHBORS = 2
-"""Computed switches beyond finger and foam, as yielding caps pass force on."""
 
 _STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
 """Steps of a sequence that fills a cube evenly (Roberts): powers of the root of x^4 = x + 1."""
@@ -78,9 +83,9 @@ class Felt:
     worst_m: tuple[float, float]
     """x and y of the worst place from the first switch."""
     least_share: float
-    """Force share of the most pressed switch, at the worst place."""
+    """Share of the force on the switch that closes first, as it closes, at the place where that is least."""
     median_share: float
-    """Median force share of the most pressed switch."""
+    """Median of these shares."""
     false_presses: float
     """Expected number of switches that close without a touch."""
 
@@ -94,8 +99,10 @@ def feel(
     acceleration_m_s2: float = 0.0,
     foam_kg_m3: float = 0.0,
     seed: int = 0,
+    body: Body = BODY,
 ) -> Felt:
-    """Sensitivity of a sheet to an elliptic finger, ``length_m`` long and ``width_m`` wide.
+    """Sensitivity of a sheet to a ``body`` whose patch is an ellipse, ``length_m`` long and ``width_m`` wide at its
+    depth.
 
     ``seed`` is the first of :data:`SHEETS`; acceleration and density are for
     :meth:`~contactfpga.design.cover.cells.Cells.false_presses`. Raises CoverError for the model ``patch``.
@@ -105,15 +112,11 @@ def feel(
         raise CoverError(f"places is {places}; it must lie between 1 and {MOST_PLACES}")
     whole = _cells(cover, sheet, seed)
     closing = _closing(cover, sheet, whole, seed)
-    window = _Window(cover, sheet, max(half))
+    touch = Touch(whole, Ellipse(*half), body, sheet.columns * sheet.pitch_x_m if sheet.closed else 0.0)
     at = spread_evenly(places, sheet)
     forces, shares = np.empty((len(closing), places)), np.empty(places)
-    for number, (x, y, angle) in enumerate(at):
-        taken, there = window.taken(Ellipse(*half, x, y, angle))
-        present = np.isfinite(closing[0][there])
-        shares[number] = taken[present].max(initial=0.0)
-        with np.errstate(divide="ignore"):
-            forces[:, number] = np.where(taken > LEAST_SHARE, closing[:, *there] / taken, np.inf).min(axis=(1, 2))
+    for number, place in enumerate(at):
+        forces[:, number], shares[number] = touch.closing_n(closing, *place.tolist())
     worst = int(np.median(forces, axis=0).argmax())
     half_n, most_n, worst_n = (
         _force(np.quantile(forces, part, axis=1, method="inverted_cdf"), part) for part in (0.5, 0.99, 1.0)
@@ -162,27 +165,35 @@ def _touches(part: float) -> str:
     return f"more than {100 * (1 - part):.3g} % of touches" if part < 1 else "some touches"
 
 
-class _Window:
-    def __init__(self, cover: Cover, sheet: Sheet, reach_m: float):
-        self.sheet = sheet
-        beyond = 0.0 if cover.cut else BEYOND * cover.thickness_m
-        more = NEIGHBORS + 2 if cover.gives_way else 1
-        sides = [(sheet.rows, sheet.pitch_y_m), (sheet.columns, sheet.pitch_x_m)]
-        wanted = [2 * (math.ceil((reach_m + beyond) / positive("pitch", pitch, "m")) + more) + 1 for _, pitch in sides]
-        rows, columns = (min(count, most) for (count, _), most in zip(sides, wanted, strict=True))
-        self.cells = Cells(cover, rows, columns, sheet.pitch_x_m, sheet.pitch_y_m)
+class Touch:
+    """A finger on a sheet. ``around_m``: length of a closed sheet along its columns, 0 of a flat one."""
 
-    def taken(self, finger: Ellipse) -> tuple[Floats, tuple[np.ndarray, np.ndarray]]:
-        sheet, (high, wide) = self.sheet, self.cells.shape
-        top = self._start(finger.y_m / sheet.pitch_y_m, high, sheet.rows, closed=False)
-        left = self._start(finger.x_m / sheet.pitch_x_m, wide, sheet.columns, sheet.closed)
-        moved = dataclasses.replace(
-            finger, x_m=finger.x_m - left * sheet.pitch_x_m, y_m=finger.y_m - top * sheet.pitch_y_m
-        )
-        found = self.cells.forces_n([Load((moved,), 1.0)])
-        return found, (top + np.arange(high)[:, None], (left + np.arange(wide)) % sheet.columns)
+    def __init__(self, cells: Cells, finger: Ellipse, body: Body, around_m: float = 0.0):
+        self._cells, self._indentation, self._around_m = cells, cells.indentation([finger], body), around_m
 
-    @staticmethod
-    def _start(middle: float, width: int, count: int, closed: bool) -> int:
-        first = round(middle) - width // 2
-        return first if closed else min(max(first, 0), count - width)
+    def closing_n(self, closing_n: Floats, x_m: float, y_m: float, angle_rad: float) -> tuple[Floats, float]:
+        """(sheets,) force at this place that closes the first switch of each sheet with (sheets, rows, columns) closing
+        forces, and that switch's share on the first sheet."""
+        force, place = 1.0, (x_m, y_m, angle_rad)
+        for _ in range(ROUNDS):
+            shares = self._shares(force, *place)
+            pressed = shares > LEAST_SHARE
+            force = float((closing_n[0][pressed] / shares[pressed]).min(initial=math.inf))
+            if not math.isfinite(force):
+                return np.full(len(closing_n), math.inf), 0.0
+        shares, more = (self._shares(part * force, *place) for part in (1.0, APART))
+        pressed = (shares > LEAST_SHARE) & (more > LEAST_SHARE)
+        if not pressed.any():
+            return np.full(len(closing_n), math.inf), 0.0
+        near, more, needed = shares[pressed], more[pressed], closing_n[:, pressed]
+        rises = np.maximum(1 + np.log(more / near) / math.log(APART), LEAST_RISE)
+        least = force * (needed / (force * near)) ** (1 / rises)
+        return least.min(axis=1, initial=math.inf), float(near[least[0].argmin()])
+
+    def _shares(self, force_n: float, x_m: float, y_m: float, angle_rad: float) -> Floats:
+        parts = self._indentation.parts_at(self._indentation.depth_m(force_n))
+        turns = (-1, 0, 1) if self._around_m else (0,)
+        loads = [
+            Load((part.placed(x_m + turn * self._around_m, y_m, angle_rad),), 1.0) for part in parts for turn in turns
+        ]
+        return self._cells.forces_n(loads)

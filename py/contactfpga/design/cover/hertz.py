@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from contactfpga.design.cover.answer import not_negative, numbers, positive
+from contactfpga.design.cover.patch import Ellipse
 from contactfpga.design.cover.point import Switch
 
 
@@ -44,6 +45,31 @@ class Ball:
             under = on_axis_pa(middle, self.patch_m(middle), depth_m) < switch.closing_pa
             low, high = (middle, high) if under else (low, middle)
         return high
+
+
+@dataclasses.dataclass(frozen=True)
+class HalfSpace:
+    """The paper's cover, F = 4/3 E* sqrt(R*) d^1.5, whose thickness has no effect until it is pressed flat."""
+
+    ball: Ball
+    thickness_m: float
+    base_n_m: float = 0.0
+
+    def force_n(self, depth_m: float) -> float:
+        """Force at a depth; 0 above the surface."""
+        if depth_m <= 0:
+            return 0.0
+        hertz = 4 / 3 * self.ball.modulus_pa * math.sqrt(self.ball.radius_m * depth_m) * depth_m
+        return hertz + self.base_n_m * max(0.0, depth_m - self.thickness_m)
+
+    def depth_m(self, force_n: float) -> float:
+        """Depth at a force, above the base; 0 without one."""
+        return self.ball.indentation_m(force_n) if force_n > 0 else 0.0
+
+    def parts_at(self, depth_m: float) -> tuple[Ellipse, ...]:
+        """The patch at a depth above 0."""
+        radius = math.sqrt(self.ball.radius_m * depth_m)
+        return (Ellipse(radius, radius),)
 
 
 def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:

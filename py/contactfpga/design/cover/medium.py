@@ -27,6 +27,9 @@ from contactfpga.inputs.values import shown
 
 MEDIA = ("halfspace", "bonded", "frictionless")
 
+POISSON = 0.2
+"""Poisson's ratio of foam."""
+
 HIGHEST_T = 30.0
 """Wave number times thickness beyond which nothing passes: 2 t^2 exp(-t) is 2e-10 there."""
 
@@ -53,6 +56,17 @@ def transfer(name: str, t: Floats) -> Floats:
         moving = t > 0
         return np.where(moving, sech * (tanh + t) / np.where(moving, tanh + t * sech**2, 1.0), 1.0)
     raise CoverError(f"medium is {shown(name)}; it must be one of {', '.join(MEDIA)}")
+
+
+def foam(t: Floats) -> Floats:
+    """G(t) of foam glued to a rigid base, for t from 0 to some hundred.
+
+    With q = 3 - 4 nu, G = (1 + q) ((1 + q) cosh t + 2 t sinh t) / (2 q cosh 2t + 4 t^2 + 1 + q^2); ``bonded`` is this
+    at nu = 0.5.
+    """
+    q, tanh, sech = 3 - 4 * POISSON, np.tanh(t), 2 * np.exp(-t) / (1 + np.exp(-2 * t))
+    below = 2 * q * (1 + tanh**2) + (1 + q**2 + 4 * t**2) * sech**2
+    return np.asarray((1 + q) * (1 + q + 2 * t * tanh) * sech / below)
 
 
 def spread(name: str, s: Floats | float) -> Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Protocol, Self
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -154,19 +154,44 @@ class Ellipse(_Shape):
 
     def density(self, x_m: Floats, y_m: Floats) -> Floats:
         u, v = self._own(x_m, y_m)
-        return np.asarray(1.5 / self.area_m2 * np.sqrt(np.maximum(0.0, 1 - u * u - v * v)))
+        return self._profile(np.maximum(0.0, 1 - u * u - v * v)) / self.area_m2
+
+    def _profile(self, share: Floats) -> Floats:
+        """Pressure over its mean, by 1 - (x/a)^2 - (y/b)^2."""
+        return np.asarray(1.5 * np.sqrt(share))
 
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
         ratio = max(self.half_x_m, self.half_y_m) / fineness_m
         nodes, weights = _gauss(4 + math.ceil(4 * ratio))
-        # With q = sqrt(1 - r^2) the pressure times the ring's area is q^2 dq, and smooth.
+        # With q = sqrt(1 - r^2) the pressure times the ring's area is smooth, for Hertz's q^2 dq.
         q = (nodes + 1) / 2
         radius = np.sqrt(1 - q * q)
         counts = 8 + np.ceil(12 * ratio * radius).astype(int)
         ring = np.repeat(np.arange(len(q)), counts)
         angles = 2 * math.pi * (np.arange(len(ring)) - np.repeat(counts.cumsum() - counts, counts)) / counts[ring]
         x, y = self._sheet(radius[ring] * np.cos(angles), radius[ring] * np.sin(angles))
-        return x, y, (1.5 * weights * q * q / counts)[ring]
+        return x, y, (weights * q * self._profile(q * q) / counts)[ring]
+
+
+@dataclasses.dataclass(frozen=True)
+class Pad(Ellipse):
+    """A rounded body's patch under the pressure of layers (:mod:`contactfpga.design.cover.layers`)."""
+
+    SHARES: ClassVar[Floats] = np.linspace(0, 1, 33)
+    """1 - (x/a)^2 - (y/b)^2 at which the pressure is stated."""
+
+    pressures: tuple[float, ...] = tuple(2 * np.linspace(0, 1, 33))
+    """Pressure over its mean at :data:`SHARES`."""
+
+    @classmethod
+    def of(cls, part: Ellipse, grown: float, pressures: Floats) -> Self:
+        """A part whose half axes have ``grown``, under these pressures in any unit."""
+        mean = float((pressures[1:] + pressures[:-1]).mean() / 2)  # as the share is even over the area
+        values = tuple((pressures / mean).tolist())
+        return cls(part.half_x_m * grown, part.half_y_m * grown, part.x_m, part.y_m, part.angle_rad, values)
+
+    def _profile(self, share: Floats) -> Floats:
+        return np.asarray(np.interp(share, self.SHARES, self.pressures))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,30 +11,37 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover import hertz, medium, point
+from contactfpga.design.cover import foams, medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
-from contactfpga.design.cover.patch import Ellipse, Part
+from contactfpga.design.cover.hertz import Ball, HalfSpace
+from contactfpga.design.cover.layers import Body, Indentation, Layer, Spring
+from contactfpga.design.cover.patch import Part
 from contactfpga.design.cover.point import Switch
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
-MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
-"""``patch``: a switch closes under the contact's shape, whatever the force. ``point``: each part's force acts at its
-middle on a half-space, paper (9). Each part's pressure acts with ``hertz`` on a half-space, with ``bonded`` or
-``frictionless`` on a layer glued to a rigid base or sliding on it."""
+MODELS = ("patch", "foam", "point")
+"""``patch``: a switch closes under the contact's shape, whatever the force. ``foam``: body and foam are pressed as
+layers (:mod:`contactfpga.design.cover.layers`), and whole foam spreads the pressure
+(:func:`contactfpga.design.cover.medium.foam`). ``point``: each part's force acts at its middle on a half-space, paper
+(9)."""
+
+GONE = ("hertz", "bonded", "frictionless")
+"""Models of earlier versions."""
 
 SHEAR = 6 / 5
 """Shear deflection of a strip over that by its mean shear stress (Timoshenko)."""
 
-GIVES = 0.75
-"""Foam thicknesses by which a strip between two caps is longer than the gap: fitted to boundary elements for caps of
-0.6 to 0.9 of the pitch under 2 and 5 mm."""
+GIVES = 0.5
+"""Foam thicknesses by which a strip between two caps is longer than the gap: fitted to the tests' finite elements of
+foam glued to caps of 0.6 to 0.94 of the pitch, 2 to 5 mm thick."""
 
 GRID = 16
 """Sampling points per side of a switch's face for :attr:`Cover.share`."""
 
-BLOCK = 1 << 15
-"""Stresses summed at once; these fit the cache."""
+
+Indenter = Indentation | HalfSpace
+"""A body on a cover: force, depth and patch."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,18 +94,17 @@ class Cover:
     """Cap on each switch; None: the foam presses the switch's own face, flush with its surroundings."""
     cut: bool = False
     """Whether the foam is cut between the caps."""
-    modulus_pa: float = 3.45e5
-    """Young's modulus of the foam, for the yield under proud caps."""
-    poisson: float = 0.3
-    """Poisson's ratio of the foam, for the yield under proud caps."""
+    modulus_pa: float = foams.find("Plastazote LD33").layer_pa
+    """E of the foam in p = E e / (1 - e). A file may have ``foam`` in its place, a name of
+    :data:`contactfpga.design.cover.foams.FOAMS`."""
 
     def __post_init__(self) -> None:
+        if self.model in GONE:
+            raise CoverError(f"model is {shown(self.model)}, which no longer exists; take 'foam'")
         if self.model not in MODELS:
             raise CoverError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         positive("thickness_m", self.thickness_m, "m")
         positive("modulus_pa", self.modulus_pa, "Pa")
-        if not is_finite(self.poisson) or not -1 < self.poisson <= 0.5:
-            raise CoverError(f"poisson is {shown(self.poisson)}; it must lie above -1 and not above 0.5")
         if not isinstance(self.cut, bool):
             raise CoverError(f"cut is {shown(self.cut)}; it must be true or false")
         self._check_caps()
@@ -113,16 +119,11 @@ class Cover:
         if self.model in ("patch", "point"):
             for name in ("cap", "cut"):
                 if getattr(self, name):
-                    raise CoverError(f"the model {self.model!r} knows no {name}; take one of {', '.join(MODELS[2:])}")
+                    raise CoverError(f"the model {self.model!r} knows no {name}; take 'foam'")
         if self.cut and self.cap is None:
             raise CoverError("cut is true; foam is cut between caps, give [cover.cap] as well")
         if self.switch.travel_m and not (self.cap and self.cap.proud):
             raise CoverError(f"travel_m is {self.switch.travel_m:g}; only a switch under a proud cap may give way")
-
-    @property
-    def within(self) -> str:
-        """The model's name in :data:`contactfpga.design.cover.medium.MEDIA`."""
-        return self.model if self.model in medium.MEDIA else "halfspace"
 
     @property
     def side_m(self) -> float:
@@ -150,36 +151,34 @@ class Cover:
         h^3).
         """
         long = (pitch_m - self.side_m) / self.thickness_m + GIVES
-        shear = self.modulus_pa / (2 * (1 + self.poisson))
-        plate = self.modulus_pa / (1 - self.poisson**2)
+        shear = self.modulus_pa / (2 * (1 + medium.POISSON))
+        plate = self.modulus_pa / (1 - medium.POISSON**2)
         return 1 / (SHEAR * long / shear + long**3 / plate)
 
-    def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Bool: which switches at these places are closed; ``x_m`` and ``y_m`` broadcast."""
+    def indentation(self, parts: Sequence[Part], body: Body, pitch_x_m: float, pitch_y_m: float) -> Indenter:
+        """A body's parts on this cover, over switches of this pitch; with ``point`` a rigid ball as large as the first
+        part on an incompressible half-space. Raises CoverError for the model ``patch``."""
         if self.model == "patch":
-            return self._covered(loads, x_m, y_m)
-        closed: np.ndarray = self.stress_pa(loads, x_m, y_m) >= self.switch.closing_pa
-        return closed
-
-    def stress_pa(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Normal stress at these places, summed over contacts. Raises CoverError for the model ``patch``."""
-        if self.model == "patch":
-            raise CoverError(f"the model 'patch' knows no stress; take one of {', '.join(MODELS[1:])}")
-        x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
-        stress = np.zeros(x.shape)
-        for load in loads:
-            for part, force in load.shares():
-                stress += self._of_part(part, force, x, y)
-        return stress
-
-    def _of_part(self, part: Part, force_n: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            raise CoverError("the model 'patch' knows no force; take 'foam'")
         if self.model == "point":
-            return point.stress_pa(force_n, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
-        if self.model == "hertz" and isinstance(part, Ellipse) and part.half_x_m == part.half_y_m:
-            return hertz.stress_pa(force_n, part.half_x_m, np.hypot(x - part.x_m, y - part.y_m), self.thickness_m)
-        return _superposed(part, force_n, self.thickness_m, self.within, x, y)
+            ball = Ball(parts[0].half_x_m ** 2 / (2 * body.depth_m), self.modulus_pa / 0.75)
+            return HalfSpace(ball, self.thickness_m)
+        return Indentation(parts, body.depth_m, self.layers(body, pitch_x_m, pitch_y_m))
 
-    def _covered(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+    def layers(self, body: Body, pitch_x_m: float, pitch_y_m: float) -> list[Layer | Spring]:
+        """Foam, the body's flesh and the switches' travel, of those that there are. Tiles carry for the gaps, too."""
+        switch, cell = self.switch, pitch_x_m * pitch_y_m
+        carries = self.area_m2 / cell if self.cut else 1.0
+        found: list[Layer | Spring] = [Layer(self.thickness_m, self.modulus_pa * carries, coupled=True)]
+        if body.flesh is not None:
+            found.append(body.flesh)
+        if switch.travel_m:
+            found.append(Spring(switch.force_n / switch.travel_m / cell, switch.travel_m))
+        return found
+
+    def under(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Bool: which switches at these places are under a contact's shape, as ``patch`` goes; ``x_m`` and ``y_m``
+        broadcast."""
         parts = [part for load in loads for part in load.parts]
         x, y = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(y_m, float))
         if self.share is None:
@@ -197,23 +196,8 @@ def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return found
 
 
-def _superposed(
-    part: Part, force_n: float, thickness_m: float, within: str, x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
-    at_x, at_y, shares = part.pressure(thickness_m)
-    places_x, places_y = x.ravel(), y.ravel()
-    stress = np.empty(places_x.shape)
-    block = max(1, BLOCK // len(shares))
-    for start in range(0, len(stress), block):
-        here = slice(start, start + block)
-        distance = np.subtract.outer(places_x[here], at_x) ** 2
-        distance += np.subtract.outer(places_y[here], at_y) ** 2
-        stress[here] = medium.spread(within, np.sqrt(distance) / thickness_m) @ shares
-    return (force_n / thickness_m**2 * stress).reshape(x.shape)
-
-
 MIN_LENGTH_M = 1e-6
-"""Least length; integrals over a layer fail far below it."""
+"""Least length."""
 
 
 def load_cover(path: str | Path) -> Cover | None:
@@ -223,6 +207,14 @@ def load_cover(path: str | Path) -> Cover | None:
 
 def read_cover(values: Any) -> Cover:
     """The cover of a TOML table with the fields of :class:`Cover`, and tables ``switch`` and ``cap``."""
+    if isinstance(values, dict) and "poisson" in values:
+        raise CoverError(f"poisson in [cover] no longer exists; leave it out, the foam's is {medium.POISSON:g}")
+    if isinstance(values, dict) and "foam" in values:
+        if "modulus_pa" in values:
+            raise CoverError("[cover] has foam and modulus_pa; leave one of them out")
+        values = {name: value for name, value in values.items() if name != "foam"} | {
+            "modulus_pa": foams.find(values["foam"]).layer_pa
+        }
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap)):
         if name in given:

@@ -1,4 +1,4 @@
-"""Distance of a zone's barycenter from the pressing body under a known cover, by the number of cells and the push.
+"""Distance of a zone's barycenter from the indentation body under a known cover, by the number of cells and the push.
 
 The same push closes one switch in the middle of a cell, and several between cells.
 """
@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Cells, Cover, Ellipse, Load, elastic
+from contactfpga.design.cover import BODIES, Cells, Cover, Load
 
 RADII_M = (0.005, 0.01, 0.02)
-"""R* of pressing balls, equally often: a pencil's end, a fingertip, a thumb."""
+"""R* of indentation balls, equally often: a pencil's end, a fingertip, a thumb."""
 
 SIDE = 6
 """Places along each side of a quarter cell."""
@@ -31,9 +31,8 @@ class Pressed:
     def __init__(self, cover: Cover, pitch_x_m: float, pitch_y_m: float):
         self._cells = Cells(cover, LINES, LINES, pitch_x_m, pitch_y_m)
         self._pitches_m = pitch_x_m, pitch_y_m
-        self._balls = [
-            Ball(radius, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson)) for radius in RADII_M
-        ]
+        rigid = BODIES["rigid"]
+        self._balls = [self._cells.indentation([rigid.ball(radius)], rigid) for radius in RADII_M]
         self._tables: dict[int, dict[int, float]] = {}
 
     def sigma_m(self, cells: int, force_n: float) -> float | None:
@@ -49,9 +48,9 @@ class Pressed:
     def _table(self, force_n: float) -> dict[int, float]:
         squares: dict[int, list[float]] = {}
         for ball in self._balls:
-            radius = ball.patch_m(force_n)
+            (part,) = ball.parts_at(ball.depth_m(force_n))
             for x, y in self._places():
-                rows, columns = np.nonzero(self._cells.closed([Load((Ellipse(radius, radius, x, y),), force_n)]))
+                rows, columns = np.nonzero(self._cells.closed([Load((part.placed(x, y, 0.0),), force_n)]))
                 if len(rows):
                     off_x, off_y = columns.mean() * self._pitches_m[0] - x, rows.mean() * self._pitches_m[1] - y
                     squares.setdefault(len(rows), []).append(float(off_x * off_x + off_y * off_y) / 2)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contactfpga.design.cover import Cells, Cover, CoverError, Ellipse, Load, cells_of
+from contactfpga.design.cover import BODIES, Cells, Cover, CoverError, Ellipse, Load, cells_of
 from contactfpga_sim.apps import covers
 
 KINDS = ("caps", "tiles")
@@ -74,12 +74,12 @@ def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers:
     turned, closes no switch, else 0. Closing forces are drawn for each."""
     pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
     cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
-    found = []
+    indentation = cells.indentation([Ellipse(*(size / 2 for size in FINGERTIP_M))], BODIES["finger"])
+    pressed, found = indentation.parts_at(indentation.depth_m(force_n)), []
     for touch in (number * TOUCHES + each for number in numbers for each in range(TOUCHES)):
         rng = np.random.default_rng([touch, LINES])
         across, down = LINES // 2 + rng.uniform(-0.5, 0.5, 2)
-        length, width = (size / 2 for size in FINGERTIP_M)
-        tip = Ellipse(length, width, across * pitch_x, down * pitch_y, rng.uniform(0, math.pi))
-        closed = cells.forces_n([Load((tip,), force_n)]) >= cells.drawn(int(rng.integers(1 << 32)))
+        parts = (tip.placed(across * pitch_x, down * pitch_y, rng.uniform(0, math.pi)) for tip in pressed)
+        closed = cells.forces_n([Load(tuple(parts), force_n)]) >= cells.drawn(int(rng.integers(1 << 32)))
         found.append(float(not closed.any()))
     return found

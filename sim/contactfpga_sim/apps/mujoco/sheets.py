@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from contactfpga.boards import ICEBREAKER
-from contactfpga.design.cover import Cover, elastic, load_cover
+from contactfpga.design.cover import BODIES, Cover, load_cover
 from contactfpga.driver import driver
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
@@ -28,7 +28,7 @@ LEAD_S = 0.01
 LOOK_S = 2.5e-4
 """Boards' step before MuJoCo's first."""
 
-COVER = Cover(model="hertz")
+COVER = Cover("foam")
 """Cover of a Skin file without ``[cover]``."""
 
 
@@ -42,9 +42,10 @@ class Sheets(Mapping[str, WornSheet]):
     Args:
       model, data: of MuJoCo; ``data`` is stepped here alone.
       robot: the file, whose ports play no part.
-      radius_m: R* in m of what touches, by which a contact's patch grows with its force (Hertz).
-      foam: the foam of the cover is the spring between the bodies, F = 4/3 E* sqrt(R*) d^1.5. MuJoCo's own contact
-        should begin below it, with ``margin`` = -thickness and ``gap`` = thickness on the geoms.
+      radius_m, body: R* in m and kind of what touches, one of :data:`contactfpga.cover.BODIES`, by which a contact's
+        patch grows with its force (:mod:`contactfpga.design.cover.layers`).
+      foam: the layers of cover and body are the spring between the bodies. MuJoCo's own contact should begin below
+        it, with ``margin`` = -thickness and ``gap`` = thickness on the geoms.
       golden: zones by the golden model in the place of the gateware.
       bridge: the board's USB chip and its settings; by default that of the iCEBreaker as the driver sets it.
       seed: of the switches' closing forces and the units' noise.
@@ -60,6 +61,7 @@ class Sheets(Mapping[str, WornSheet]):
         robot: str | Path,
         *,
         radius_m: float = 0.02,
+        body: str = "rigid",
         foam: bool = False,
         golden: bool = False,
         bridge: BridgeSettings | None = None,
@@ -72,12 +74,12 @@ class Sheets(Mapping[str, WornSheet]):
         covers = _covers(Path(robot))
         bridge = bridge or BridgeSettings(ICEBREAKER.bridge)
         self._worn = {
-            name: WornSheet(plan, covers[name], radius_m, bridge, golden, seed + number)
+            name: WornSheet(plan, covers[name], radius_m, BODIES[body], bridge, golden, seed + number)
             for number, (name, plan) in enumerate(self.body.links.items())
         }
         self._bodies = [_body(model, plan) for plan in self.body.links.values()]
         self._owner = _owners(model, self.body, self._bodies)
-        self._springs = [elastic.stiffness(worn.ball) for worn in self._worn.values()] if foam else []
+        self._springs = [worn.indentation for worn in self._worn.values()] if foam else []
         self._steps, self._still_s = 0, LEAD_S
         self._joints, self._history = _joints(model, self.body), JointHistory()
         self._every = max(1, round(1e-3 / model.opt.timestep))
@@ -182,7 +184,7 @@ class Sheets(Mapping[str, WornSheet]):
         for number, second, owner in self._contacts():
             contact = data.contact[number]
             outward = (-1.0 if second else 1.0) * contact.frame[:3]
-            force = -self._springs[owner] * max(0.0, -contact.dist) ** 1.5 * outward
+            force = -self._springs[owner].force_n(-contact.dist) * outward
             found[number, owner] = force
             if contact.geom.min() < 0:  # a flex, whose force its corners would share
                 raise BodyError("a soft body touches a sheet, and foam=True pushes rigid ones alone; take foam=False")

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Cover, Ellipse, Load, cells_of, elastic
+from contactfpga.design.cover import Body, Cover, Indenter, cells_of
+from contactfpga.design.cover.moving import MovingBody
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, ReadTimeout
 from contactfpga.robot.body.plan import Plan
@@ -21,7 +22,6 @@ from contactfpga_sim.apps.mujoco.golden import GoldenBoard
 from contactfpga_sim.apps.mujoco.touch import SheetTouch
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.scenes.felt import LoadedUnits
-from contactfpga_sim.model.scenes.scene import around_m
 
 POLL_S = 1e-6
 """Advance of the board, but not the robot, in a read without waiting."""
@@ -32,10 +32,11 @@ class WornSheet:
 
     board: Board
 
-    def __init__(self, plan: Plan, cover: Cover, radius_m: float, bridge: BridgeSettings, golden: bool, seed: int):
+    def __init__(
+        self, plan: Plan, cover: Cover, radius_m: float, body: Body, bridge: BridgeSettings, golden: bool, seed: int
+    ):
         skin = self.skin = plan.skin
         self.plan = plan
-        self.ball = Ball(radius_m, elastic.effective_modulus_pa(cover.modulus_pa, cover.poisson))
         self.touches: list[SheetTouch] = []
         self.fingers: tuple[Finger, ...] = ()
         self.contact = False
@@ -45,6 +46,7 @@ class WornSheet:
         """Transforms each packet of the USB chip; if it raises :class:`~contactfpga.PortLost`, the plug is pulled."""
         pitches = (1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
         self._cells = cells_of(cover, skin.rows, skin.columns, *pitches, seed)
+        self._moving = MovingBody(cover, self._cells.shape, pitches, (body.ball(radius_m),), body, skin.closed)
         self.forces_n: Floats = np.zeros((skin.rows, skin.columns))
         """(rows, columns) force in N on each switch."""
         self.closed = np.zeros((skin.rows, skin.columns), bool)
@@ -85,25 +87,22 @@ class WornSheet:
         """Apply touches from now on."""
         if touches or self.touches:
             self.touches = touches
-            loads = self._loads()
-            self.forces_n = self._cells.forces_n(loads) if loads else np.zeros(self.closed.shape)
+            self.forces_n = sum((self._under(touch) for touch in touches), np.zeros(self.closed.shape))
             closed = self._cells.closed_by(self.forces_n, self.closed)
             if not np.array_equal(closed, self.closed):
                 self.closed = closed
                 self._device.press(closed)
         self._load()
 
-    def _loads(self) -> list[Load]:
-        found = []
-        for touch in self.touches:
-            if touch.x_mm is None or touch.y_mm is None or touch.push_n <= 0:
-                continue
-            radius = self.ball.patch_m(touch.push_n)
-            turns = (-1, 0, 1) if self.skin.closed else (0,)  # pressed over the seam, too
-            for turn in turns:
-                x_m = 1e-3 * touch.x_mm + turn * around_m(self.skin)
-                found.append(Load((Ellipse(radius, radius, x_m, 1e-3 * touch.y_mm),), touch.push_n))
-        return found
+    @property
+    def indentation(self) -> Indenter:
+        """The cover between the link and what touches it."""
+        return self._moving.indentation
+
+    def _under(self, touch: SheetTouch) -> Floats:
+        if touch.x_mm is None or touch.y_mm is None:
+            return np.zeros(self.closed.shape)
+        return self._moving.forces_n(1e-3 * touch.x_mm, 1e-3 * touch.y_mm, touch.push_n)
 
     def _load(self) -> None:
         if self._units is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactfpga.design.cover import Cap, Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import covers
 from contactfpga_sim.apps.stats import wilson
@@ -16,7 +18,10 @@ from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 
-TOUCHES = 120
+TOUCHES = 40
+
+SOLID_N = 1000.0
+"""Peak force at which foam and flesh are long pressed solid; what it is then, the rigid bodies decide."""
 
 SAME = 0.03
 """Largest relative difference of the two halves of the touches at which a worst value is printed."""
@@ -24,63 +29,50 @@ SAME = 0.03
 QUANTILE = 0.95
 
 
+BUTTON_MM = 3.5
+
+
 class Geometry(NamedTuple):
     face: str
-    """One of :data:`FACES`."""
+    """``flush, point force`` (the paper's half-space), ``flush``, ``buttons``, ``caps`` or ``tiles``."""
     pitch_mm: float
     threshold_n: float
     foam_mm: float
 
     def case(self) -> Case:
-        """The paper's arm with this cover."""
-        return Case.load("paper").but(
-            **FACES[self.face](self.pitch_mm, self.threshold_n),
-            foam={"thickness_m": 1e-3 * self.foam_mm, "cut": self.face == "tiles"},
+        """The paper's arm with this cover of the paper's foam."""
+        paper = Case.load("paper")
+        flush = self.face.startswith("flush")
+        switch = paper.switch.switch if flush else covers.DOME
+        side_mm = BUTTON_MM if self.face == "buttons" else self.pitch_mm - covers.GAP_MM
+        cover = Cover(
+            "point" if self.face == PAPER.face else "foam",
+            1e-3 * self.foam_mm,
+            dataclasses.replace(switch, force_n=self.threshold_n),
+            cap=None if flush else Cap(1e-3 * side_mm),
+            cut=self.face == "tiles",
+            modulus_pa=paper.foam.modulus_pa,
         )
+        return paper.wearing(cover)
 
-
-def _flush(model: str) -> Callable[[float, float], dict[str, Any]]:
-    return lambda pitch_mm, force_n: {"model": model, "switch": {"force_n": force_n}}
-
-
-def _proud(side_mm: Callable[[float], float]) -> Callable[[float, float], dict[str, Any]]:
-    dome = {name: getattr(covers.DOME, name) for name in ("travel_m", "spread", "hysteresis")}
-
-    def changes(pitch_mm: float, force_n: float) -> dict[str, Any]:
-        cap = {"side_m": 1e-3 * side_mm(pitch_mm)}
-        return {"model": "frictionless", "switch": {"force_n": force_n, **dome}, "cap": cap}
-
-    return changes
-
-
-BUTTON_MM = 3.5
-_CAP = _proud(lambda pitch_mm: pitch_mm - covers.GAP_MM)
-FACES: dict[str, Callable[[float, float], dict[str, Any]]] = {
-    "flush, point force": _flush("point"),
-    "flush": _flush("hertz"),
-    "buttons": _proud(lambda pitch_mm: BUTTON_MM),
-    "caps": _CAP,
-    "tiles": _CAP,
-}
-"""Changes to the paper's case by face, for pitch in mm and closing force in N."""
 
 PAPER = Geometry("flush, point force", 10.0, 1.0, 5.0)
+FLUSH = PAPER._replace(face="flush")
 BEST = Geometry("tiles", 6.4, 0.4, 5.0)
-_CHANGES = (
-    {"face": "flush"},
-    {"face": "buttons"},
-    {"face": "caps"},
-    {"face": "tiles"},
-    {"pitch_mm": 6.4},
-    {"threshold_n": 0.4},
-    {"threshold_n": 0.2},
-    {"foam_mm": 2.0},
-    {"foam_mm": 10.0},
+CHANGES: tuple[tuple[str, Any], ...] = (
+    ("face", "buttons"),
+    ("face", "caps"),
+    ("face", "tiles"),
+    ("pitch_mm", 6.4),
+    ("threshold_n", 0.4),
+    ("threshold_n", 0.2),
+    ("foam_mm", 2.0),
+    ("foam_mm", 10.0),
 )
+"""Changes to :data:`FLUSH`: a field and its value."""
 
-
-GEOMETRIES = (PAPER, *(PAPER._replace(**change) for change in _CHANGES), BEST, BEST._replace(foam_mm=2.0))
-"""The paper's sheet and each change to it, the best sheet, and the kits'."""
+GEOMETRIES = (PAPER, FLUSH, *(FLUSH._replace(**{field: value}) for field, value in CHANGES), BEST)
+"""The paper's sheet by its half-space and as a layer, each change to the latter, and the best sheet."""
 
 WAYS = ("6 ms", "UART", "pin", "limit alone")
 
@@ -145,6 +137,13 @@ def worst_text(halves: Sequence[Peaks]) -> str:
     return f"95 %: {value:.1f} ({low:.1f} to {high:.1f})"
 
 
+def peak_text(halves: Sequence[Peaks]) -> str:
+    """Worst and mean peak force in N, or ``solid`` (:data:`SOLID_N`)."""
+    if max(half.force_n.max() for half in halves) > SOLID_N:
+        return "solid"
+    return f"{worst_text(halves)} / {mean_n(halves):.1f}"
+
+
 def share_text(marks: np.ndarray) -> str:
     """A share in % with Wilson's 95 % interval."""
     hits, of = int(marks.sum()), len(marks)
@@ -159,12 +158,12 @@ def _limited(halves: Sequence[Peaks]) -> str:
 HEADINGS = ("way", "touches", "mean peak force, N", "worst, N", "torque limit first", "pressed in, mm")
 
 
-def lines(case: Case, found: Found, first: str) -> list[list[str]]:
+def lines(found: Found, first: str) -> list[list[str]]:
     """Headings and a line per way; ``first`` names the fixed latency."""
     told = [list(HEADINGS)]
     for name, halves in zip((first, *WAYS[1:]), found):
         count = sum(len(half.force_n) for half in halves)
-        numbers = [f"{mean_n(halves):.1f}", worst_text(halves), _limited(halves), _deep(case.foam.thickness_m, halves)]
+        numbers = [f"{mean_n(halves):.1f}", worst_text(halves), _limited(halves), _deep(halves)]
         told.append([name, str(count), *numbers])
     return told
 
@@ -181,73 +180,45 @@ def as_json(found: Found, first: str) -> dict[str, Any]:
     }
 
 
-def _deep(thickness_m: float, halves: Sequence[Peaks]) -> str:
-    deep = np.concatenate([half.indentation_m for half in halves])
-    flat = deep > thickness_m
-    return f"{1e3 * deep.max():.1f}" + (f", flat {share_text(flat)}" if flat.any() else "")
+def _deep(halves: Sequence[Peaks]) -> str:
+    return f"{1e3 * max(half.indentation_m.max() for half in halves):.1f}"
 
 
 def geometry_lines(found: Mapping[Geometry, Found]) -> list[list[str]]:
     head = ["face", "pitch, mm", "threshold, N", "foam, mm"]
-    told = [[*head, *(f"{way}: mean / worst, N" for way in WAYS), "limit first, UART", "pressed in by UART, mm"]]
+    told = [[*head, *(f"{way}: worst / mean, N" for way in WAYS), "limit first, UART", "pressed in by UART, mm"]]
     for geometry, ways_found in found.items():
         by_uart = ways_found[WAYS.index("UART")]
         told.append(
             [
                 geometry.face,
                 *(f"{value:g}" for value in geometry[1:]),
-                *(f"{mean_n(halves):.1f} / {worst_text(halves)}" for halves in ways_found),
+                *(peak_text(halves) for halves in ways_found),
                 _limited(by_uart),
-                _deep(1e-3 * geometry.foam_mm, by_uart),
+                _deep(by_uart),
             ]
         )
     return told
 
 
-FACTORS = {"face": "face", "pitch_mm": "pitch, mm", "threshold_n": "threshold, N", "foam_mm": "foam, mm"}
-
-
-class Effect(NamedTuple):
-    factor: str
-    before: str
-    after: str
-    newtons: float
-
-
-def effects(found: Mapping[Geometry, Found], base: Geometry) -> list[Effect]:
-    """Effects by UART of each geometry one change away from ``base``, and of the least latency."""
-    uart = WAYS.index("UART")
-    told = []
-    for geometry in found:
-        changed = [name for name in FACTORS if getattr(geometry, name) != getattr(base, name)]
-        if len(changed) == 1:
-            before, after = (_shown(getattr(one, changed[0])) for one in (base, geometry))
-            told.append(
-                Effect(FACTORS[changed[0]], before, after, mean_n(found[geometry][uart]) - mean_n(found[base][uart]))
-            )
-    late, pin = (mean_n(found[base][WAYS.index(way)]) for way in ("6 ms", "pin"))
-    return [*told, Effect("latency", "6 ms", "pin", pin - late)]
-
-
-def _shown(value: str | float) -> str:
-    return value if isinstance(value, str) else f"{value:g}"
-
-
 def matters(found: Mapping[Geometry, Found]) -> str:
-    least: dict[str, Effect] = {}
-    for one in effects(found, PAPER):
-        if one.factor not in least or one.newtons < least[one.factor].newtons:
-            least[one.factor] = one
-    first, *others = sorted(least.values(), key=lambda effect: effect.newtons)
-    told = [f"{one.factor.partition(',')[0]} {one.after} {one.newtons:+.1f} N" for one in others]
-    before, after = (found[base][WAYS.index("UART")] for base in (PAPER, BEST))
-    latency = next(one for one in effects(found, BEST) if one.factor == "latency")
+    def mean(geometry: Geometry, way: str = "UART") -> float:
+        return mean_n(found[geometry][WAYS.index(way)])
+
+    gained = [
+        (mean(FLUSH._replace(**{field: value})) - mean(FLUSH), field.partition("_")[0], f"{value}")
+        for field, value in CHANGES
+    ]
+    gained.append((mean(FLUSH, "pin") - mean(FLUSH, "6 ms"), "latency", "pin"))
+    least = {factor: (newtons, value) for newtons, factor, value in sorted(gained, reverse=True)}
+    first, *others = sorted((newtons, f"{factor}: {value}") for factor, (newtons, value) in least.items())
+    told = [f"{what.replace(':', '')} {newtons:+.1f} N" for newtons, what in others]
+    before, after = (found[base][WAYS.index("UART")] for base in (FLUSH, BEST))
     return (
-        f"**What matters most is the {first.factor.partition(',')[0]}: {first.after} in place of "
-        f'"{first.before}" change the mean peak force over touches anywhere by {first.newtons:+.1f} N**; '
-        f"{', '.join(told)}, each changed alone from the paper's sheet. Tiles {BEST.pitch_mm:g} mm apart on switches "
-        f"of {BEST.threshold_n:g} N: {mean_n(after):.1f} N in the mean and {worst_text(after)} N at worst by UART, the "
-        f"torque limit first at {_limited(after)}; the paper's sheet: {mean_n(before):.1f} N, {worst_text(before)} N, "
-        f"{_limited(before)}. With these tiles latency from {latency.before} to the {latency.after} "
-        f"changes the mean by {latency.newtons:+.1f} N."
+        f"**What matters most against a rigid body is the {first[1]} {first[0]:+.1f} N in the mean peak force over "
+        f"touches anywhere**; {', '.join(told)}, each changed alone from the paper's sheet, with its foam as a layer. "
+        f"Tiles {BEST.pitch_mm:g} mm apart on switches of {BEST.threshold_n:g} N: {peak_text(after)} N (worst / mean) "
+        f"by UART, the torque limit first at {_limited(after)}; the paper's sheet: {peak_text(before)} N, "
+        f"{_limited(before)}. With these tiles latency from 6 ms to the pin changes the mean by "
+        f"{mean(BEST, 'pin') - mean(BEST, '6 ms'):+.1f} N."
     )

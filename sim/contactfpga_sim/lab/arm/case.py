@@ -7,15 +7,26 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.design.cover import Ball, Cap, Cover, elastic
+from contactfpga.design.cover import BODIES, Ball, Cap, Cover, Indenter, elastic
 from contactfpga.design.cover.region import Pressing
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga_sim.lab.arm.parts import BEHAVIORS, ArmLink, Contacts, Control, Foam, Motor, Run, Touch, Usb
+from contactfpga.skin import Skin
+from contactfpga_sim.lab.arm.parts import (
+    BEHAVIORS,
+    ArmLink,
+    Contacts,
+    Control,
+    Foam,
+    Motor,
+    Run,
+    Touch,
+    Usb,
+)
 
 _CASES = Path(__file__).parent / "cases"
-MODELS = ("point", "hertz", "bonded", "frictionless")
+MODELS = ("point", "foam")
 MAX_STEPS = 1_000_000
 STEPS_A_TIME_CONSTANT = 4
 """Least steps in the time constant of the current, the plant's shortest."""
@@ -38,14 +49,19 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """Spread of force below the cover, one of :data:`MODELS`. All but ``point`` press as wide as Hertz's patch of
-    the foam's R*."""
+    """``point``: the paper's half-space and point force. ``foam``: body, foam and switches as layers, see
+    :mod:`contactfpga.design.cover.layers`."""
+    body: str = "rigid"
+    """What the arm runs into, of :data:`contactfpga.design.cover.BODIES`; for ``foam``."""
     cap: Cap | None = None
     """Cap on each switch; None: the foam presses the switches' flush faces."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
         _one_of("model", self.model, MODELS)
+        _one_of("body", self.body, tuple(BODIES))
+        if self.model == "point" and self.body != "rigid":
+            raise CaseError(f"body is {shown(self.body)}; the model 'point' knows rigid ones alone, take 'foam'")
         _ = self.cover  # refuses what no cover can be
         if not self.touch:
             raise CaseError("touch is empty; the arm must run into at least one thing")
@@ -69,8 +85,16 @@ class Case:
     @functools.cached_property
     def cover(self) -> Cover:
         foam = self.foam
-        known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa, "poisson": foam.poisson}
+        known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
+
+    def spring(self, skin: Skin) -> Indenter:
+        """The cover between the arm and what it runs into."""
+        if self.model == "point":
+            return self.foam.half_space
+        body = BODIES[self.body]
+        pitches = 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm
+        return self.cover.indentation([body.ball(self.foam.radius_m)], body, *pitches)
 
     @property
     def pressing(self) -> Pressing:
@@ -93,6 +117,13 @@ class Case:
             new[name] = change
         return dataclasses.replace(self, **new)
 
+    def wearing(self, cover: Cover | None) -> Case:
+        """A copy whose arm has this cover; None: the same."""
+        if cover is None:
+            return self
+        foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
+        return self.but(model=cover.model, cap=cover.cap, foam=foam, switch=dataclasses.asdict(cover.switch))
+
     @classmethod
     def load(cls, name: str | Path) -> Case:
         """Load a packaged case by name, or a TOML file; its ``like`` names the case it differs from."""
@@ -109,6 +140,7 @@ _PARTS = {
     "usb": Usb,
     "run": Run,
 }
+_NAMES = ("model", "body")
 
 
 def names() -> list[str]:
@@ -133,9 +165,9 @@ def _values(name: str, before: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def _case(name: str, values: dict[str, Any]) -> Case:
-    unknown = sorted(set(values) - {*_PARTS, "touch", "model"})
-    if unknown:
-        raise CaseError(f"{name}: unknown part {shown(unknown[0])}; known are {', '.join([*_PARTS, 'touch', 'model'])}")
+    known = (*_PARTS, "touch", *_NAMES)
+    if unknown := sorted(set(values) - set(known)):
+        raise CaseError(f"{name}: unknown part {shown(unknown[0])}; known are {', '.join(known)}")
     parts: dict[str, Any] = {
         part: _part(name, part, kind, values[part]) for part, kind in _PARTS.items() if part in values
     }
@@ -143,8 +175,7 @@ def _case(name: str, values: dict[str, Any]) -> Case:
         if not isinstance(values["touch"], list):
             raise CaseError(f"{name}: touch is {shown(values['touch'])}; it must be a part, [[touch]]")
         parts["touch"] = tuple(_part(name, "touch", Touch, one) for one in values["touch"])
-    if "model" in values:
-        parts["model"] = values["model"]
+    parts |= {word: values[word] for word in _NAMES if word in values}
     missing = [part for part in ("link", "motor", "control", "foam", "switch") if part not in parts]
     if missing:
         raise CaseError(f"{name}: the part [{missing[0]}] is missing; a case may begin with like = 'paper'")

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 
 from contactfpga.design.cover import Ball, Switch, elastic
 from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
+from contactfpga.design.cover.hertz import HalfSpace
 from contactfpga_sim.apps.latency.usb import HOST_S
 
 BEHAVIORS = ("reverse", "comply")
@@ -107,31 +107,27 @@ class Control(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Foam(_Checked):
-    """The cover: F = K_s delta^1.5 (1 + damping d delta/dt), on a stiff base."""
+    """The cover, with losses F (1 + damping d delta/dt)."""
 
     modulus_pa: float
-    poisson: float
     radius_m: float
+    """R* of the arm on what it runs into."""
     thickness_m: float
+    poisson: float = 0.5
+    """For the paper's half-space."""
     damping: float = 0.0
     """Damping in s/m, after Hunt and Crossley; 0: lossless."""
     base_n_m: float = 1e6
-    """Base, added once the foam is pressed flat."""
+    """Base under the half-space, added once it is pressed flat."""
     cut: bool = False
-    """Whether foam is cut into tiles; the plant's spring stays that of whole foam."""
+    """Whether foam is cut into tiles."""
     _zero = ("damping",)
 
     @functools.cached_property
-    def stiffness(self) -> float:
-        """K_s in N/m^1.5."""
-        return elastic.stiffness(Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson)))
-
-    def force_n(self, indentation_m: float, rate_m_s: float = 0.0) -> float:
-        """Force at an indentation that grows by ``rate_m_s``; never negative."""
-        if indentation_m <= 0:
-            return 0.0
-        force = self.stiffness * indentation_m * math.sqrt(indentation_m) * (1 + self.damping * rate_m_s)
-        return max(0.0, force) + self.base_n_m * max(0.0, indentation_m - self.thickness_m)
+    def half_space(self) -> HalfSpace:
+        """The paper's spring."""
+        ball = Ball(self.radius_m, elastic.effective_modulus_pa(self.modulus_pa, self.poisson))
+        return HalfSpace(ball, self.thickness_m, self.base_n_m)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,8 +5,7 @@ touch, positive into the obstacle.
 
 - Joint with a stiff gear: (J + N^2 J_r) d omega/dt = N k i - sum d F.
 - Motor: L di/dt = u - R i - N k omega, with the voltage u = K (i_ref - i) + R i_ref + N k omega within the supply.
-- Foam pressed in by delta: F = K_s delta^1.5 (1 + c d delta/dt), and K_b (delta - e) more once foam of thickness e is
-  pressed flat on its base.
+- Foam pressed in by delta: F = S(delta) (1 + c d delta/dt), with the case's spring S.
 
 The torque sensor between motor and arm reads J d omega/dt + sum d F.
 """
@@ -17,6 +16,7 @@ import itertools
 import math
 from typing import NamedTuple
 
+from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case
 
 State = tuple[float, ...]
@@ -33,9 +33,9 @@ class Forces(NamedTuple):
 
 
 class Plant:
-    def __init__(self, case: Case):
+    def __init__(self, case: Case, skin: Skin | None = None):
         self._motor = case.motor
-        self._foam = case.foam
+        self._spring, self._damping = case.spring(skin or Skin()), case.foam.damping
         places = itertools.count(3, 2)
         self._touches = [
             (touch, touch.lever_m or case.link.lever_m, next(places) if touch.mass_kg else None) for touch in case.touch
@@ -55,7 +55,7 @@ class Plant:
             given, rate = (0.0, 0.0) if place is None else (state[place], state[place + 1])
             came, coming = touch.pushed(seconds)
             depth = lever * theta - touch.gap_m + came - given
-            force = self._foam.force_n(depth, lever * omega + coming - rate)
+            force = max(0.0, self._spring.force_n(depth) * (1 + self._damping * (lever * omega + coming - rate)))
             forces.append(force)
             depths.append(depth)
             torque += lever * force
@@ -88,15 +88,6 @@ class Plant:
         four = self.slope(seconds + step_s, _moved(state, step_s, three), wanted_a)
         sixth = step_s / 6
         return tuple([y + sixth * (a + 2 * (b + c) + d) for y, a, b, c, d in zip(state, one, two, three, four)])
-
-    def energy_j(self, state: State) -> float:
-        """Energy of arm, rotor, foam and base, if nothing is pushed and all is rigid."""
-        held = self._inertia * state[1] ** 2 / 2
-        for touch, lever, _ in self._touches:
-            depth = max(0.0, lever * state[0] - touch.gap_m)
-            held += 0.4 * self._foam.stiffness * depth**2.5
-            held += self._foam.base_n_m * max(0.0, depth - self._foam.thickness_m) ** 2 / 2
-        return held
 
 
 def _moved(state: State, by: float, slope: State) -> State:

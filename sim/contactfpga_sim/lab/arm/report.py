@@ -131,7 +131,7 @@ DEFENDED: dict[str, dict[str, Any]] = {
     "on a switch": {},
     "halfway between four switches": {"touch": (HALFWAY,)},
     "that, 0.1 m from the joint": {"touch": (HALFWAY | {"lever_m": 0.1},)},
-    "the patch's pressure, not a point force": {"model": "hertz"},
+    "foam as a layer, not a half-space": {"model": "foam"},
 }
 """Touches of the defense table, as changes to the case."""
 

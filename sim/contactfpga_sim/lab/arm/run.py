@@ -195,7 +195,7 @@ def _outcome(world: World) -> ArmResponse:
         peak_force_n=float(course["force_n"].max()),
         peak_torque_nm=float(np.abs(course["sensor_nm"]).max()),
         peak_indentation_m=float(course["indentation_m"].max()),
-        bottomed=bool(course["indentation_m"].max() > world.case.foam.thickness_m),
+        bottomed=bool(course["indentation_m"].max() > world.deepest_m),
         resolved_s=None if opened is None else float(time[opened]),
         rest_s=float(time[last_fast + 1]) if last_fast + 1 < len(course) else None,
         reversals=sum(state == "reversing" for _, state, _ in events),

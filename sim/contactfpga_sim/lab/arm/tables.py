@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from contactfpga_sim.apps.pool import executor, progress
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.arm import anywhere, comply, pictures, report, sweep
+from contactfpga_sim.lab.arm import anywhere, comply, kits, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord, run
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
@@ -17,7 +18,8 @@ from contactfpga_sim.lab.arm.world import Faults
 
 PLACES = (
     anywhere.PAPER,
-    *(anywhere.PAPER._replace(face=face) for face in ("buttons", "tiles")),
+    anywhere.FLUSH,
+    *(anywhere.FLUSH._replace(face=face) for face in ("buttons", "tiles")),
     anywhere.BEST,
 )
 """Geometries that the page shows."""
@@ -33,6 +35,7 @@ class ArmRuns(NamedTuple):
     points: dict[SweepTask, SweepPoint]
     columns: dict[str, RunRecord]
     anywhere: dict[anywhere.Geometry, anywhere.Found]
+    kits: dict[kits.Collision, anywhere.Found]
 
 
 def compute() -> ArmRuns:
@@ -41,7 +44,8 @@ def compute() -> ArmRuns:
     with executor() as workers, progress() as step:
         points = dict(zip(plan.all, sweep.sweep(plan.all, workers, step)))
         touched = anywhere.many(anywhere.study(), workers, step)
-    return ArmRuns(plan, points, report.columns(case, "paper", pictures.PAPER_S), touched)
+        covered = anywhere.many(kits.study(kits.fingers()), workers, step)
+    return ArmRuns(plan, points, report.columns(case, "paper", pictures.PAPER_S), touched, covered)
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
@@ -60,7 +64,7 @@ BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 FAILURES = (
     Failure("nothing wrong", {}),
     Failure("halfway between four switches", {"touch": (HALFWAY,)}),
-    Failure("the patch's pressure, not a point force", {"model": "hertz"}),
+    Failure("foam as a layer, not a half-space", {"model": "foam"}),
     Failure("bounce of 8 ms, nobody waits", {"switch": BOUNCING, "control": {"clear_s": 0.0}}),
     Failure("bounce of 8 ms, 2 ms without contact", {"switch": BOUNCING, "control": {"clear_s": 2e-3}}),
     Failure("board dies before the contact", {}, faults=Faults(board_dies_s=4e-3)),
@@ -78,6 +82,16 @@ def places_table(found: ArmRuns) -> writer.Table:
     shown = [row for geometry, row in zip(found.anywhere, rows, strict=True) if geometry in PLACES]
     columns = [name for name in head if not name.startswith(("limit alone", "pressed in"))]
     return writer.Table(head, rows, lambda row: row in shown, columns)
+
+
+def kits_table(found: ArmRuns) -> writer.Table:
+    """The page has one kit at twice the speed, and neither palms nor the paper's half-space."""
+    head, *rows = kits.lines(found.kits)
+
+    def shown(row: Sequence[str]) -> bool:
+        return row[1] != "palm" and "point" not in row[0] and (row[0] == "starter" or row[2] == rows[0][2])
+
+    return writer.Table(head, rows, shown)
 
 
 def set_table(found: ArmRuns) -> writer.Table:

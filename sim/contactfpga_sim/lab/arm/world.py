@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Cells, Ellipse, Load, cells_of, elastic
+from contactfpga.design.cover import BODIES, Cells, Indentation, Indenter, Load, cells_of
 from contactfpga.skin import Skin
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
@@ -23,12 +23,9 @@ from contactfpga_sim.lab.arm.plant import Plant, finite
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 _MM = 1e-3
-_PATCH_M = 1e-3
 
-_FINE = 1.1
-"""Ratio of forces at which a wide patch is computed; in between, pressure per newton is linear."""
-
-_LEAST_N = 0.01
+_LEAST_N, _FINE = 0.01, 1.1
+"""Forces at which shares are computed: the least, and the ratio of successive ones."""
 
 
 class Switches:
@@ -37,8 +34,8 @@ class Switches:
         self._cells = cells_of(case.cover, skin.rows, skin.columns, *pitches)
         self._bounce_s, self._period_s = case.switch.bounce_s, case.switch.bounce_period_s
         self._touches = case.touch
-        foam = case.foam
-        self._ball = Ball(foam.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, foam.poisson))
+        body = BODIES[case.body]
+        self._indentation = self._cells.indentation([body.ball(case.foam.radius_m)], body)
         self._made = np.zeros((skin.rows, skin.columns), bool)
         self._since = np.full(self._made.shape, -np.inf)
         self._any = False
@@ -78,21 +75,22 @@ class Switches:
         return found
 
     def _per_newton(self, touch: Touch, force_n: float) -> np.ndarray:
-        if self._cells.cover.model == "point":  # where it does not depend on the force
-            return pressed(self._cells, touch.x_mm, touch.y_mm, _PATCH_M)
+        """(rows, columns) share of the force on each switch, between forces at which it is computed."""
         place = max(0.0, math.log(force_n / _LEAST_N) / math.log(_FINE))
         below = math.floor(place)
-        lower, upper = (self._ball.patch_m(_LEAST_N * _FINE**number) for number in (below, below + 1))
-        one, other = (pressed(self._cells, touch.x_mm, touch.y_mm, radius) for radius in (lower, upper))
+        one, other = (
+            shares(self._cells, self._indentation, touch.x_mm, touch.y_mm, _LEAST_N * _FINE**number)
+            for number in (below, below + 1)
+        )
         found: np.ndarray = one + (place - below) * (other - one)
         return found
 
 
 @functools.lru_cache(maxsize=2048)
-def pressed(cells: Cells, x_mm: float, y_mm: float, radius_m: float) -> np.ndarray:
-    """(rows, columns) share of a force on each switch, from a round patch on the cover."""
-    part = Ellipse(radius_m, radius_m, x_mm * _MM, y_mm * _MM)
-    return cells.forces_n([Load((part,), 1.0)])
+def shares(cells: Cells, indentation: Indenter, x_mm: float, y_mm: float, force_n: float) -> np.ndarray:
+    """(rows, columns) share of a force on each switch, at this force."""
+    parts = indentation.parts_at(indentation.depth_m(force_n))
+    return cells.forces_n([Load(tuple(part.placed(x_mm * _MM, y_mm * _MM, 0.0) for part in parts), 1.0)])
 
 
 THRESHOLD_N = 2.0
@@ -175,8 +173,8 @@ class World:
         self.detected_s: float | None = None
         """Arrival of the first contact at the controller's input."""
         self.peak_n = 0.0
-        self._way, self._latency_s = way, latency_s
-        self._plant = Plant(case)
+        self._way, self._latency_s, self._skin = way, latency_s, skin
+        self._plant = Plant(case, skin)
         self._switches = Switches(case, skin)
         self._board = CompiledBoard(skin, capture=("contact",)) if way in (*PINS, "uart") else None
         self._under = UnitsUnderSheet(case, skin) if way in UNITS else None
@@ -195,6 +193,12 @@ class World:
         self._wanted = 0.0
         self._state = self._plant.start(case.link.speed_m_s / case.link.lever_m, case.run.lead_s)
         self._ticks = round(case.control.period_s / case.run.step_s)
+
+    @property
+    def deepest_m(self) -> float:
+        """Depth from which on the foam is pressed flat: by the paper, its thickness."""
+        spring = self.case.spring(self._skin)
+        return spring.flat_m if isinstance(spring, Indentation) else spring.thickness_m
 
     def clock(self) -> float:
         return self._number * self.case.run.step_s

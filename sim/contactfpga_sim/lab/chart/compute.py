@@ -162,7 +162,7 @@ def timing(task: Task, first: int) -> Raw:
 
 
 def _touches(task: Task, first: int) -> list[Scene]:
-    return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, first=first)
+    return touches(task.family, min(PIECE, task.count - first), task.seed, task.skin, task.cover, first=first)
 
 
 def compared(looks: Iterable[errors.Look], skin: Skin) -> Found:

@@ -39,6 +39,6 @@ def timed(point: Point) -> Point:
     task = point.task
     if task.skin.report != "cells":
         return point
-    scenes = touches(task.family, FRAMES, task.seed, task.skin)
+    scenes = touches(task.family, FRAMES, task.seed, task.skin, task.cover)
     frames = [scene.pressed(scene.settled_s, task.skin, task.cover) for scene in scenes]
     return dataclasses.replace(point, host_us=label_us(frames, task.skin.connectivity))

@@ -13,12 +13,11 @@ import numpy as np
 from matplotlib.patches import Rectangle
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel
+from contactfpga.design.cover import Cap, Cells, Cover, Ellipse, Load, NoSolution, Sheet, Switch, feel, medium
 from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force
 from contactfpga.design.cover.press import SHEAR
 from contactfpga_sim.apps import covers
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.cover.elements import FoamOnCaps
 
 PITCHES_MM = (10.0, 6.4)
 FORCES_N = (1.0, 0.4)
@@ -32,15 +31,15 @@ FLUSH = 0.8
 
 
 def _flush_face(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("bonded", 5e-3, Switch(force_n))
+    return Cover("foam", 5e-3, Switch(force_n))
 
 
 def _flush_cap(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("bonded", 5e-3, Switch(force_n), cap=Cap(FLUSH * pitch_mm * 1e-3, proud=False))
+    return Cover("foam", 5e-3, Switch(force_n), cap=Cap(FLUSH * pitch_mm * 1e-3, proud=False))
 
 
 def _button(pitch_mm: float, force_n: float) -> Cover:
-    return Cover("frictionless", 5e-3, Switch(force_n), cap=Cap(4e-3))
+    return Cover("foam", 5e-3, Switch(force_n), cap=Cap(4e-3))
 
 
 def _caps(pitch_mm: float, force_n: float) -> Cover:
@@ -91,41 +90,6 @@ def _newtons(force: Force | NoSolution) -> str:
     return "none" if isinstance(force, NoSolution) else f"{force.value_n:.2g} N"
 
 
-# ---- against the boundary elements
-
-THICKNESSES_MM, SIDES_MM = (2.0, 5.0), (4.0, 6.0, 8.0, 9.0)
-SOFT_N_MM = covers.DOME.force_n / (1e3 * covers.DOME.travel_m)
-PLACES_MM = ((45.0, 45.0), (40.0, 45.0), (40.0, 40.0), (42.0, 43.0))
-"""Places on a cap, between two, between four and aside, from the corner of 8x8 caps at 10 mm."""
-
-
-def elements_table() -> str:
-    """Deviation of the largest switch force from boundary elements, at the worst place."""
-    head = ["foam", "cap, pitch 10 mm", "flush, rigid", "proud, rigid", f"proud, on {SOFT_N_MM:g} N/mm"]
-    rows = [head]
-    for thickness, side in itertools.product(THICKNESSES_MM, SIDES_MM):
-        errors = [
-            _off(thickness, side, stiffness, proud)
-            for stiffness, proud in ((math.inf, False), (math.inf, True), (SOFT_N_MM, True))
-        ]
-        rows.append([f"{thickness:g} mm", f"{side:g} mm", *(f"{100 * error:+.1f} %" for error in errors)])
-    return writer.table_of(rows)
-
-
-def _off(thickness_mm: float, side_mm: float, stiffness: float, proud: bool) -> float:
-    foam = FoamOnCaps(thickness_mm, side_mm, stiffness=stiffness, proud=proud)
-    switch = Switch(travel_m=0.0 if math.isinf(stiffness) else 1e-3 / stiffness)
-    cells = Cells(
-        Cover("frictionless", thickness_mm * 1e-3, switch, cap=Cap(side_mm * 1e-3, proud)), 8, 8, 10e-3, 10e-3
-    )
-    errors = []
-    for x, y in PLACES_MM:
-        exact = foam.forces(foam.ellipse(x, y, 7, 6, 2.0)).max()
-        load = Load((Ellipse(7e-3, 6e-3, (x - 5) * 1e-3, (y - 5) * 1e-3),), 2.0)
-        errors.append(float(cells.forces_n([load]).max() / exact) - 1)
-    return max(errors, key=abs)
-
-
 # ---- foam that sags between proud caps
 
 
@@ -136,8 +100,8 @@ def sagging_n(cover: Cover, pitch_m: float, proud_m: float = PROUD_MM * 1e-3) ->
     g^4/(32 E h^3).
     """
     gap, thick = pitch_m - cover.side_m, cover.thickness_m
-    shear = cover.modulus_pa / (2 * (1 + cover.poisson))
-    plate = cover.modulus_pa / (1 - cover.poisson**2)
+    shear = cover.modulus_pa / (2 * (1 + medium.POISSON))
+    plate = cover.modulus_pa / (1 - medium.POISSON**2)
     per_pascal = SHEAR * gap**2 / (8 * shear * thick) + gap**4 / (32 * plate * thick**3)
     return proud_m / per_pascal * math.pi / 4 * LENGTH_M * WIDTH_M
 

@@ -10,9 +10,11 @@ from contactfpga.design.cover import drawing, elastic, impact, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import GRAVITY, Arm
 from contactfpga.design.cover.design import thinning
+from contactfpga.design.cover.foams import FOAMS
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
-from contactfpga.design.cover.task import FIRST_DESIGN, FOAMS, WORST_M
+from contactfpga.design.cover.layers import BODIES
+from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.cover import caps, formulas
 
@@ -213,6 +215,50 @@ def sense_table() -> str:
     return writer.table_of(rows)
 
 
+def body_table() -> str:
+    rows = [["body", "flesh", "E", "depth", "source"]]
+    for name, depth_m, flesh, source in BODIES.values():
+        soft = ["none", ""]
+        if flesh is not None:
+            soft = [f"{1e3 * flesh.thickness_m:g} mm", f"{1e-3 * flesh.modulus_pa:g} kPa"]
+        rows.append([f"`{name}`", *soft, f"{1e3 * depth_m:g} mm", source])
+    return writer.table_of(rows)
+
+
+AREAS_AT_N = (0.25, 1.0, 2.0, 7.0)
+
+
+def fingertip_table() -> str:
+    """The modeled fingertip beside published ones, of which nothing has set it."""
+    tip, finger = formulas.fingertip(), formulas.pressed_finger()
+    areas = [f"{1e6 * finger.parts_at(finger.depth_m(force))[0].area_m2:.0f}" for force in AREAS_AT_N]
+    pawluk = "[Pawluk and Howe 1999](https://doi.org/10.1115/1.2800860)"
+    rows = [
+        (f"correlation of ln F with depth, to {formulas.HARDEST_N:g} N", "exponential", 1.0, tip.exponential, pawluk),
+        ("largest difference of the pressure from a paraboloid's, of its peak", "none", 0.0, tip.paraboloid, pawluk),
+        (
+            "correlation of the secant modulus F/d^1.5 with F",
+            "straight line",
+            1.0,
+            tip.secant,
+            "[Dzidek et al. 2017](https://doi.org/10.1098/rsif.2016.0935), figure 7",
+        ),
+        (
+            "power of F with which the depth grows",
+            "2/3",
+            2 / 3,
+            tip.power,
+            "[a fingerpad by Hertz, 2001](https://koreascience.kr/article/JAKO200111919995062.page)",
+        ),
+    ]
+    lines = [
+        (what, theirs, f"{ours:.3f}", f"{ours - value:+.3f}", source) for what, theirs, value, ours, source in rows
+    ]
+    at = ", ".join(f"{force:g}" for force in AREAS_AT_N)
+    area = (f"area at {at} N, mm²", "not read", ", ".join(areas), "", "Serina et al. 1998, J Biomech 31, 639")
+    return writer.table_of([("what", "published", "model", "deviation", "source"), *lines, area])
+
+
 DISAGREES = ("wrong;", "inconsistent", "low by", "vacuous", "the cover bottoms", "the model fails", "fails its own")
 """Beginnings of the verdicts that the page shows."""
 
@@ -244,12 +290,12 @@ def thinning_table() -> str:
 
 
 def foam_table() -> writer.Table:
-    head, rows = ["foam", "E", "density", "Y", "pressed up to", "source"], []
+    head, rows = ["foam", "E", "E of the layer", "density", "Y", "pressed up to", "source"], []
     for one in FOAMS:
         density = "" if one.density_kg_m3 is None else f"{one.density_kg_m3:g} kg/m³"
         strength = "" if one.yield_pa is None else f"{1e-3 * one.yield_pa:g} kPa"
         modulus, strain = f"{1e-3 * one.modulus_pa:g} kPa", f"{100 * one.strain:g} %"
-        rows.append([one.name, modulus, density, strength, strain, one.source])
+        rows.append([one.name, modulus, f"{1e-3 * one.layer_pa:.0f} kPa", density, strength, strain, one.source])
     return writer.Table(head, rows, columns=head[:-1])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -33,16 +34,17 @@ STARTER = kit("starter")
 COVER = load_cover(STARTER.skin_path)
 
 
-def _middle(pitch_mm: float, rng: np.random.Generator) -> np.ndarray:
-    return pitch_mm * rng.uniform(7, 8, 2)
+def _scene(pitch_mm: float, rng: np.random.Generator, touch: Callable[[float, float], Iterable[Contact]]) -> Scene:
+    """Contacts around a place in the inner quarter of 16x16 switches, on a sheet drawn for them."""
+    return Scene(tuple(touch(*pitch_mm * rng.uniform(4, 11, 2))), int(rng.integers(2**63)))
 
 
 def _pair(
     gap_mm: float, radius_mm: float, pitch_mm: float, rng: np.random.Generator, force_n: float | None = None
 ) -> Scene:
-    x, y = _middle(pitch_mm, rng)
     forces = {} if force_n is None else {"force_n": force_n}
-    return Scene(contacts.pair(gap_mm, radius_mm, x, y, rng.uniform(0, 180), **forces))
+    angle = rng.uniform(0, 180)
+    return _scene(pitch_mm, rng, lambda x, y: contacts.pair(gap_mm, radius_mm, x, y, angle, **forces))
 
 
 def _closing(skin: Skin, pitch_mm: float, gap_mm: float, rng: np.random.Generator, count: int) -> list[Outcome]:
@@ -90,12 +92,14 @@ CLOSING = Knob(
 
 
 def _light(radius_mm: float, force_n: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-    skin, cells = STARTER.skin, []
-    for _ in range(count):
-        x, y = _middle(skin.pitch_x_mm, rng)
-        finger = Contact(shape=contacts.disc(radius_mm), x_mm=x, y_mm=y, force_n=force_n)
-        cells.append(Scene((finger,)).pressed(0.0, skin, COVER))
-    return [_counted(zones, each, 1) for zones, each in zip(seen(skin, np.array(cells)), cells)]
+    skin = STARTER.skin
+
+    def finger(x: float, y: float) -> tuple[Contact]:
+        return (Contact(shape=contacts.disc(radius_mm), x_mm=x, y_mm=y, force_n=force_n),)
+
+    scenes = (_scene(skin.pitch_x_mm, rng, finger) for _ in range(count))
+    cells = np.array([scene.pressed(0.0, skin, COVER) for scene in scenes])
+    return [_counted(zones, each, 1) for zones, each in zip(seen(skin, cells), cells)]
 
 
 LIGHT = Knob(
@@ -103,7 +107,7 @@ LIGHT = Knob(
     title="A finger that presses lightly on the starter kit",
     axis="force, N",
     values=(20, 15, 10, 8, 6, 5, 4, 3.5, 3, 2.5, 2, 1.5, 1.25, 1, 0.75, 0.5),
-    runs={f"flat, {2 * radius} mm": Rated(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
+    runs={f"{2 * radius} mm": Rated(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
     helps="switches of less force; `contactfpga cover felt` says from which force on a finger is felt",
     unnoticed="a switch that is pressed too lightly to close is one that nobody touches",
 )
@@ -125,7 +129,7 @@ def _slide(skin: Skin, cover: Cover | None, speed: float, rng: np.random.Generat
     moving = Track((start, end), ends if sum(way) > 0 else ends[::-1])
     middle = rng.uniform(7, 8) * pitch
     x, y = (moving, middle) if way[0] else (middle, moving)
-    scene = Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
+    scene = Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),), int(rng.integers(2**63)))
     pressed = scene.on(skin, cover)
     with Rig(skin) as rig:
         while rig.board.cycle < end * skin.clock_hz:

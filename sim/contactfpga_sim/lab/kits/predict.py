@@ -1,7 +1,7 @@
 """Predictions of a kit with 95 % intervals.
 
-Gateware and bridge times are exact up to crystal and touches. Circuit and cover are drawn within assumed tolerances
-(:func:`drawn_circuit`, :func:`drawn_cover`), from 2.5 to 97.5 %.
+Gateware and bridge times are exact up to crystal and touches. Circuit, cover and finger are drawn within
+:data:`CIRCUIT` and :data:`COVER`, from 2.5 to 97.5 %.
 """
 
 from __future__ import annotations
@@ -9,21 +9,23 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import datetime
-import functools
 import math
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, Needs, load_circuit, needed_by
+from contactfpga.design.circuit import Circuit, load_circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
-from contactfpga.design.cover.felt import LENGTH_M, WIDTH_M, Force, Sheet, feel
-from contactfpga.design.cover.patch import Ellipse
-from contactfpga.design.cover.press import Cover, Load
+from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel, spread_evenly
+from contactfpga.design.cover.layers import BODIES, Body
+from contactfpga.design.cover.patch import Ellipse, Rectangle
+from contactfpga.design.cover.press import Cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
@@ -43,24 +45,88 @@ AWAKE_US, LONGEST_US = 700, 2000
 """First line check, and latest report of a break."""
 CRYSTAL = 1e-4
 PRESSED_N = 2.0
+SPEED_MM_S = 150.0
+"""Speed of the finger whose time until it is felt is predicted: the middle of those of the scenes."""
 PLACES = tuple((x / 4, y / 4) for y in range(3) for x in range(3))
 """Finger middles, in pitches from a switch: on it, between two, among four, halfway."""
-AROUND = 7
-"""Rows and columns that take force."""
+ANYWHERE = 200
+"""Places of each drawn finger on its sheet."""
+ROD_MM, PLATE_MM, PLATE_N = 4.0, 30.0, 20.0
+"""Width of the rod on a cap, side of the plate, and the force on it."""
+FINGER = f"a finger of {1e3 * LENGTH_M:g} x {1e3 * WIDTH_M:g} mm at a depth of {1e3 * BODY.depth_m:g} mm"
+
+
+class Tolerance(NamedTuple):
+    """What is not known of a value: a factor."""
+
+    what: str
+    low: float
+    high: float
+    source: str = "assumed"
+
+    def drawn(self, rng: np.random.Generator) -> float:
+        """Uniform between the limits; from a factor of two between them on, its logarithm is."""
+        if self.high < 2 * self.low:
+            return float(rng.uniform(self.low, self.high))
+        return math.exp(rng.uniform(math.log(self.low), math.log(self.high)))
+
+
+CIRCUIT = {
+    "junction_pf": Tolerance("a diode's capacitance", 0.7, 1.3),
+    "saturation_a": Tolerance("a diode's saturation current", 1 / 3, 3.0),
+    "line_pf": Tolerance("a line's capacitance to ground", 0.7, 1.3),
+    "crossing_pf": Tolerance("a crossing's capacitance", 0.7, 1.3),
+    "neighbor_pf": Tolerance("capacitance between neighbors", 0.7, 1.3),
+    "line_ohm": Tolerance("a line's resistance", 0.8, 1.2),
+    "pin_ohm": Tolerance("a pin's resistance", 0.75, 1.25),
+    "series_ohm": Tolerance("series resistors", 0.99, 1.01, "1 % parts"),
+    "column_pull_ohm": Tolerance("pull-ups of columns", 0.99, 1.01, "1 % parts"),
+    "row_pull_ohm": Tolerance("pull-ups of rows", 0.99, 1.01, "1 % parts"),
+    "switch_ohm": Tolerance("a closed switch's resistance", 0.01, 1.0),
+    "supply_v": Tolerance("the supply", 0.97, 1.03),
+}
+COVER = {
+    "flesh": Tolerance(
+        "stiffness of the finger's flesh",
+        0.6,
+        1.7,
+        "0.07 to 0.2 MPa by 'Experimental determination of the Young's modulus for the fingers'",
+    ),
+    "patch": Tolerance("length and width of the finger's contact", 0.75, 1.25, "assumed: 9 to 15 mm long"),
+    "depth": Tolerance("depth at which the finger has this contact", 0.75, 1.25),
+    "foam": Tolerance("the foam's modulus", 0.7, 1.3),
+    "curve": Tolerance("the foam's curve", 0.75, 1.25, "points of the named foams, at most 23 % off E e/(1 - e)"),
+    "thickness": Tolerance("the foam's thickness", 0.9, 1.1),
+    "force": Tolerance("closing force of a batch of domes", 0.9, 1.1),
+    "travel": Tolerance("the domes' travel", 0.75, 1.25),
+    "tilt": Tolerance("closing force of each cap as it tilts", 0.96, 1.04, "frame that holds caps within 0.05 mm"),
+}
+"""Tolerances by key of :func:`pressing`. Closing forces of a sheet's domes differ by the cover's ``spread`` besides."""
+TILT = (COVER["tilt"].high - COVER["tilt"].low) / math.sqrt(12)
+"""Standard deviation of the factor that each cap has of its own."""
 
 
 def predicted(kit: Kit) -> dict[str, Prediction]:
-    """All predictions of a kit by name; takes a minute or two."""
+    """All predictions of a kit by name; takes some six minutes, most of them for circuits."""
     found = [*_times(kit), *_circuit(kit), *_cover(kit)]
     return {one.name: one for one in found}
 
 
-def _made(name: str, what: str, unit: str, values: Sequence[float], model: str, command: str) -> Prediction:
+UNITS = {"v": "V", "ma": "mA", "n": "N", "share": "%", "s": "1/s"}
+"""Units by the end of a prediction's name, where they differ."""
+
+
+def _unit(name: str) -> str:
+    end = name.rpartition("_")[2]
+    return UNITS.get(end, end)
+
+
+def _made(name: str, what: str, values: Sequence[float], model: str, command: str) -> Prediction:
     """The first value to five digits, with the interval of the others, widened to hold it."""
     low, high = np.quantile(values[1:] or values, [0.025, 0.975])
     value, low, high = (float(f"{one:.5g}") for one in (values[0], min(low, values[0]), max(high, values[0])))
     today = datetime.date.today()
-    return Prediction(name, what, unit, value, low, high, model, command, today, _commit())
+    return Prediction(name, what, _unit(name), value, low, high, model, command, today, _commit())
 
 
 def _commit() -> str:
@@ -90,15 +156,13 @@ def _times(kit: Kit) -> Iterator[Prediction]:
             values = [times.quantile(share), *(times.quantile(one) for one in shares)]
             near = [values[0] * (1 - CRYSTAL), values[0] * (1 + CRYSTAL)]
             said = f"{what}, {statistic} of {TOUCHES} {tries}"
-            yield _made(f"{name}_{statistic}_us", said, "us", values + near, model, by)
+            yield _made(f"{name}_{statistic}_us", said, values + near, model, by)
     rate = board.frames_per_s
-    yield _made(
-        "frames_per_s", "frames while a contact moves", "1/s", [rate, 0.99 * rate, 1.01 * rate], "gateware", command
-    )
-    yield _made("frame_bytes", "bytes of a frame with one contact", "bytes", [board.bytes], "gateware", command)
+    yield _made("frames_per_s", "frames while a contact moves", [rate, 0.99 * rate, 1.01 * rate], "gateware", command)
+    yield _made("frame_bytes", "bytes of a frame with one contact", [board.bytes], "gateware", command)
     edges = [1.0, 1 - CRYSTAL, 1 + CRYSTAL]
     yield _made(
-        "alive_ms", "time between two edges of `alive`", "ms", edges, "gateware", f"contactfpga build --kit {kit.name}"
+        "alive_ms", "time between two edges of `alive`", edges, "gateware", f"contactfpga build --kit {kit.name}"
     )
 
 
@@ -129,32 +193,30 @@ def _between_checks(board: CompiledBoard, rows: dict[int, int], columns: dict[in
     return MixedTimes(us[:1], us[1:], np.ones(1))
 
 
-def _near(rng: np.random.Generator, share: float) -> float:
-    return float(rng.uniform(1 - share, 1 + share))
-
-
 def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
-    """A sheet within tolerances: lines 30 %, pins 25, pulls and series resistors 1; switches from 1 ohm to the
-    stated value; the diode's capacitance 30, its current a factor of 3."""
-    near = functools.partial(_near, rng)
-    diode = dataclasses.replace(
-        circuit.diode,
-        junction_pf=circuit.diode.junction_pf * near(0.3),
-        saturation_a=circuit.diode.saturation_a * math.exp(rng.uniform(-1, 1) * math.log(3)),
-    )
-    return circuit.replace(
-        line_pf=circuit.line_pf * near(0.3),
-        crossing_pf=circuit.crossing_pf * near(0.3),
-        neighbor_pf=circuit.neighbor_pf * near(0.3),
-        line_ohm=circuit.line_ohm * near(0.2),
-        pin_ohm=circuit.pin_ohm * near(0.25),
-        series_ohm=circuit.series_ohm * near(0.01),
-        column_pull_ohm=circuit.column_pull_ohm * near(0.01),
-        row_pull_ohm=circuit.row_pull_ohm * near(0.01),
-        switch_ohm=math.exp(rng.uniform(0, math.log(circuit.switch_ohm))),
-        supply_v=circuit.supply_v * near(0.03),
-        diode=diode,
-    )
+    """A sheet within :data:`CIRCUIT`."""
+    factors = {name: one.drawn(rng) for name, one in CIRCUIT.items()}
+    diode = {name: getattr(circuit.diode, name) * factors.pop(name) for name in ("junction_pf", "saturation_a")}
+    values = {name: getattr(circuit, name) * factor for name, factor in factors.items()}
+    return circuit.replace(diode=dataclasses.replace(circuit.diode, **diode), **values)
+
+
+NEEDED = {
+    "settle_us": ("a row selected until the slowest column reads right", "settle.seconds"),
+    "precharge_us": ("columns driven until they are charged", "precharge.seconds"),
+    "pulled_release_us": ("pull-ups alone lift the columns after a pressed row", "pulled_release.seconds"),
+    "pressed_v": ("a pressed column while its whole row is pressed", "pressed.level_v"),
+    "unpressed_v": ("a column that neighbors pull after a precharge", "unpressed_v"),
+    "row_ma": ("the pin of a row whose switches are all pressed", "pressed.pin_ma"),
+    "row_peak_ma": ("the pin of a row while lines are charged", "row_peak_ma"),
+    "column_peak_ma": ("the pin of a column while it is charged", "column_peak_ma"),
+}
+PROJECTED = {
+    "project_us": ("rows let go until all read right", "project.seconds"),
+    "touched_v": ("a touched row while one column feeds all rows", "touched.level_v"),
+    "feeding_ma": ("the pin of a column that feeds all rows", "touched.pin_ma"),
+}
+"""Sentence and value of what :class:`~contactfpga.design.circuit.Needs` tell, the latter of a scan that reads rows."""
 
 
 def _circuit(kit: Kit) -> Iterator[Prediction]:
@@ -163,80 +225,120 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
     needs = [needed_by(skin, one) for one in drawn]
-    values: dict[str, tuple[str, str, Callable[[Needs], float]]] = {
-        "settle_us": (
-            "a row selected until the slowest column reads right",
-            "us",
-            lambda one: 1e6 * one.settle.seconds,
-        ),
-        "precharge_us": ("columns driven until they are charged", "us", lambda one: 1e6 * one.precharge.seconds),
-        "pulled_release_us": (
-            "pull-ups alone lift the columns after a pressed row",
-            "us",
-            lambda one: 1e6 * one.pulled_release.seconds,
-        ),
-        "pressed_v": ("a pressed column while its whole row is pressed", "V", lambda one: one.pressed.level_v),
-        "unpressed_v": ("a column that neighbors pull after a precharge", "V", lambda one: one.unpressed_v),
-        "row_ma": ("the pin of a row whose switches are all pressed", "mA", lambda one: one.pressed.pin_ma),
-        "row_peak_ma": ("the pin of a row while lines are charged", "mA", lambda one: one.row_peak_ma),
-        "column_peak_ma": ("the pin of a column while it is charged", "mA", lambda one: one.column_peak_ma),
-    }
-    if skin.reads_rows:
-        values |= {
-            "project_us": ("rows let go until all read right", "us", lambda one: 1e6 * one.project.seconds),
-            "touched_v": ("a touched row while one column feeds all rows", "V", lambda one: one.touched.level_v),
-            "feeding_ma": ("the pin of a column that feeds all rows", "mA", lambda one: one.touched.pin_ma),
-        }
     command = f"contactfpga settle --kit {kit.name} --margin 1"
-    for name, (what, unit, of) in values.items():
-        yield _made(name, what, unit, [of(one) for one in needs], "circuit", command)
+    for name, (what, value) in (NEEDED | (PROJECTED if skin.reads_rows else {})).items():
+        found = [float(attrgetter(value)(one)) for one in needs]
+        yield _made(name, what, [1e6 * one for one in found] if _unit(name) == "us" else found, "circuit", command)
 
 
-def drawn_cover(cover: Cover, rng: np.random.Generator) -> Cover:
-    """A cover within tolerances: domes 10 % of force and 25 of travel, foam 30 % of modulus and 10 of thickness."""
-    near = functools.partial(_near, rng)
+class Pressing(NamedTuple):
+    """A cover, and the finger on it."""
+
+    cover: Cover
+    finger: Ellipse
+    """Its contact at the body's depth, long along the rows."""
+    body: Body
+
+
+def pressing(cover: Cover, factors: Mapping[str, float]) -> Pressing:
+    """A cover and a finger with values multiplied by factors.
+
+    The keys are those of :data:`COVER`, and ``spread``; ``tilt`` is a standard deviation, such as :data:`TILT`.
+    """
+    of = {**dict.fromkeys([*COVER, "spread"], 1.0), "tilt": 0.0, **factors}
     switch = dataclasses.replace(
-        cover.switch, force_n=cover.switch.force_n * near(0.1), travel_m=cover.switch.travel_m * near(0.25)
+        cover.switch,
+        force_n=cover.switch.force_n * of["force"],
+        travel_m=cover.switch.travel_m * of["travel"],
+        spread=math.hypot(cover.switch.spread * of["spread"], of["tilt"]),
     )
-    return dataclasses.replace(
-        cover, switch=switch, modulus_pa=cover.modulus_pa * near(0.3), thickness_m=cover.thickness_m * near(0.1)
+    flesh = BODY.flesh and BODY.flesh._replace(modulus_pa=BODY.flesh.modulus_pa * of["flesh"])
+    modulus, thickness = cover.modulus_pa * of["foam"] * of["curve"], cover.thickness_m * of["thickness"]
+    return Pressing(
+        dataclasses.replace(cover, switch=switch, modulus_pa=modulus, thickness_m=thickness),
+        Ellipse(LENGTH_M / 2 * of["patch"], WIDTH_M / 2 * of["patch"]),
+        BODY._replace(depth_m=BODY.depth_m * of["depth"], flesh=flesh),
     )
+
+
+def drawn_factors(rng: np.random.Generator) -> dict[str, float]:
+    """Factors within :data:`COVER` for :func:`pressing`."""
+    return {name: one.drawn(rng) for name, one in COVER.items()} | {"tilt": TILT}
+
+
+MEASURED = {
+    **{
+        f"closing_{number}_n": (
+            f"force of {FINGER}, long along the rows, {x:g} and {y:g} pitches off a switch's middle, when it is felt"
+        )
+        for number, (x, y) in enumerate(PLACES)
+    },
+    "closing_rod_n": f"force of a rigid rod of {ROD_MM:g} mm on a cap's middle when it is felt",
+    "felt_half_n": f"force from which half of all touches by {FINGER} are felt, anywhere",
+    "felt_most_n": f"force from which 99 % of all touches by {FINGER} are felt, anywhere",
+    "felt_share": f"touches of {PRESSED_N:g} N by {FINGER} that are felt, at those nine places",
+    "first_closing_ms": (
+        f"time from the first touch of the foam, on a switch, by {FINGER} at {SPEED_MM_S:g} mm/s until it is felt"
+    ),
+    "finger_mm": f"way of {FINGER} from its first touch of the foam to {PRESSED_N:g} N",
+    "plate_mm": f"depth to which {PLATE_N:g} N press a rigid plate of {PLATE_MM:g} x {PLATE_MM:g} mm",
+}
+"""What a builder can measure of a cover."""
 
 
 def _cover(kit: Kit) -> Iterator[Prediction]:
-    skin, nominal = kit.skin, load_cover(kit.skin_path)
-    assert nominal is not None
-    pitch_m = 1e-3 * skin.pitch_x_mm
+    stated = load_cover(kit.skin_path)
+    assert stated is not None
     rng = np.random.default_rng(2)
-    covers = [nominal, *(drawn_cover(nominal, rng) for _ in range(DRAWS))]
-    closing = np.array([closing_n(cover, pitch_m, seed) for seed, cover in enumerate(covers)])
-    command = f"contactfpga cover felt --kit {kit.name}"
-    for number, (x, y) in enumerate(PLACES):
-        what = f"force of a fingertip whose middle is {x:g} and {y:g} pitches from a switch's when it is felt"
-        yield _made(f"closing_{number}_n", what, "N", list(closing[:, number]), "cover", command)
-    sheet = Sheet(skin.rows, skin.columns, pitch_m, 1e-3 * skin.pitch_y_mm)
-    felt = [feel(cover, sheet, places=400) for cover in covers[: 1 + DRAWS // 10]]
-    for name, what in (("half", "half of all fingertips"), ("most", "99 % of all fingertips")):
-        values = [force.value_n for one in felt if isinstance(force := getattr(one, name), Force)]
-        yield _made(f"felt_{name}_n", f"force from which {what} are felt, anywhere", "N", values, "cover", command)
-    shares = [float((100 * (one <= PRESSED_N)).mean()) for one in closing]
-    what = f"touches of {PRESSED_N:g} N that are felt, at those nine places"
-    yield _made("felt_share", what, "%", shares, "cover", command)
+    drawn = [measured(pressing(stated, drawn_factors(rng)), kit.skin, seed) for seed in range(DRAWS)]
+    usual = measured(pressing(stated, {"spread": 0.0}), kit.skin, 0) | _felt(stated, kit.skin)
+    for name, what in MEASURED.items():
+        command = f"contactfpga cover felt --kit {kit.name}"
+        if not name.startswith("felt_"):
+            command = f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
+        yield _made(name, what, [one[name] for one in (usual, *drawn)], "cover", command)
 
 
-def closing_n(cover: Cover, pitch_m: float, seed: int) -> np.ndarray:
-    """First closing force at each of :data:`PLACES`; the first cover has no spread."""
-    if not seed:
-        cover = dataclasses.replace(cover, switch=dataclasses.replace(cover.switch, spread=0.0))
-    cells = Cells(cover, AROUND, AROUND, pitch_m, pitch_m, seed)
-    middle = AROUND // 2 * pitch_m
-    found = []
-    for x, y in PLACES:
-        finger = Ellipse(LENGTH_M / 2, WIDTH_M / 2, middle + x * pitch_m, middle + y * pitch_m, 0.0)
-        taken = cells.forces_n([Load((finger,), 1.0)])
-        with np.errstate(divide="ignore"):
-            found.append(cells.thresholds_n / np.where(taken > 0, taken, np.nan))
-    return np.nanmin(np.array(found), axis=(1, 2))
+def _felt(cover: Cover, skin: Skin) -> dict[str, float]:
+    """What the command says."""
+    felt = feel(cover, sheet(skin))
+    found = {"felt_half_n": felt.half, "felt_most_n": felt.most}
+    return {name: force.value_n for name, force in found.items() if isinstance(force, Force)}
+
+
+def sheet(skin: Skin) -> Sheet:
+    return Sheet(skin.rows, skin.columns, 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
+
+
+def measured(one: Pressing, skin: Skin, seed: int) -> dict[str, float]:
+    """What a builder measures on the sheet of this seed, by key of :data:`MEASURED`."""
+    on = sheet(skin)
+    cells = Cells(one.cover, on.rows, on.columns, on.pitch_x_m, on.pitch_y_m, seed)
+    indentation, plate = (
+        cells.indentation([part], body)
+        for part, body in (
+            (one.finger, one.body),
+            (Rectangle(5e-4 * PLATE_MM, 5e-4 * PLATE_MM), BODIES["rigid"]),
+        )
+    )
+    touch = Touch(cells, one.finger, one.body)
+
+    def closing_n(touch: Touch, *place: float) -> float:
+        return float(touch.closing_n(cells.thresholds_n[None], *place)[0][0])
+
+    x_m, y_m = on.columns // 2 * on.pitch_x_m, on.rows // 2 * on.pitch_y_m
+    places = [closing_n(touch, x_m + x * on.pitch_x_m, y_m + y * on.pitch_y_m, 0.0) for x, y in PLACES]
+    anywhere = [closing_n(touch, *place) for place in spread_evenly(ANYWHERE, on).tolist()]
+    half, most = np.quantile(anywhere, [0.5, 0.99], method="inverted_cdf")
+    return {f"closing_{number}_n": force for number, force in enumerate(places)} | {
+        "closing_rod_n": closing_n(Touch(cells, Ellipse(ROD_MM / 2e3, ROD_MM / 2e3), BODIES["rigid"]), x_m, y_m, 0.0),
+        "felt_half_n": float(half),
+        "felt_most_n": float(most),
+        "felt_share": 100 * float(np.mean(np.array(places) <= PRESSED_N)),
+        "first_closing_ms": 1e6 * indentation.depth_m(places[0]) / SPEED_MM_S,
+        "finger_mm": 1e3 * indentation.depth_m(PRESSED_N),
+        "plate_mm": 1e3 * plate.depth_m(PLATE_N),
+    }
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections
-import csv
 import functools
 import tempfile
 from collections.abc import Iterator
@@ -13,32 +12,34 @@ from typing import NamedTuple
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import load_circuit
-from contactfpga.design.cover import load_cover
+from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet import lay_out
-from contactfpga.driver import health
+from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, pnr_report
-from contactfpga_sim.apps import pool
+from contactfpga_sim.apps import covers, pool
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import Spread
 from contactfpga_sim.apps.latency.stages import Finger
 from contactfpga_sim.apps.latency.usb import BridgeSettings
+from contactfpga_sim.apps.stats import Rate
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.arm import anywhere
+from contactfpga_sim.lab.arm import kits as kits_arm
+from contactfpga_sim.lab.kits import counts, predict
+from contactfpga_sim.lab.kits.counts import Drawn
 
 NAMES = ("starter", "fast")
 SEEDS = (1, 2, 3)
 """Seeds of place and route."""
-COVER = "| run, 6.4 mm, tiles |"
-PAPER = "| run, 6.4 mm, paper |"
 PEAKS = {
-    "UART": "that an arm runs into anywhere, worst / mean",
+    "UART": "of an arm that runs into a body anywhere, worst / mean",
     "6 ms": "if the stop comes 6 ms late",
     "limit alone": "if no stop comes and only the limit of torque holds",
 }
-"""Columns of :data:`PLACES`, and what a row of the README says of them."""
-PLACES = "docs/tables/arm-places.csv"
-PAPER_SHEET = ("flush, point force", 10.0, 1.0, 5.0)
-"""Face, pitch in mm, threshold in N and foam in mm of a row there."""
+"""What a row of the README says of each of :data:`contactfpga_sim.lab.arm.anywhere.WAYS`."""
+BODIES = ("forearm", "rigid")
+"""Ends of what the arm may run into, which nobody knows better."""
 
 
 class KitFigures(NamedTuple):
@@ -52,8 +53,7 @@ def compute() -> list[KitFigures]:
 
 
 def _figures(kit: Kit) -> KitFigures:
-    settings = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
-    finger = stages.measure(kit.skin, settings, host_touches=0)
+    finger = stages.measure(kit.skin, BridgeSettings(kit.board.bridge), host_touches=0)
     with pool.executor() as workers:
         return KitFigures(kit, finger, tuple(workers.map(functools.partial(_built, kit), SEEDS)))
 
@@ -70,7 +70,9 @@ def _worst_first(us: Spread, digits: int = 0) -> str:
 def headline(found: list[KitFigures]) -> str:
     """The README's table: both kits, and comparisons."""
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
-    fingers, paper_fingers = (_of_page("chart.md", start, 2) for start in (COVER, PAPER))
+    skin = found[0].kit.skin
+    paper = skin, covers.paper(skin.pitch_x_mm)
+    *fingers, paper_fingers = (_share(rate) for rate in _rates(counts.FINGERS, paper))
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
@@ -90,11 +92,11 @@ def headline(found: list[KitFigures]) -> str:
             "the same",
         ),
         (
-            "[Scenes of two to five fingers miscounted](docs/chart.md#every-method), 95 % interval",
-            *(f"**{fingers}**",) * 2,
+            f"[Scenes of {counts.FINGERS.name}](docs/kits.md#how-many-touches) miscounted, 95 % interval",
+            *(f"**{one}**" for one in fingers),
             f"{paper_fingers} with the paper's switch and foam at this pitch",
         ),
-        *(_peak_row(way, found) for way in PEAKS),
+        *_peak_rows(found),
     ]
     return writer.table_of(rows)
 
@@ -108,31 +110,35 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
     )
 
 
-def _of_page(page: str, start: str, column: int) -> str:
-    text = Path("docs", page).read_text(encoding="utf-8")
-    found = [line for line in text.splitlines() if line.startswith(start) and ";" in line]
-    return found[0].strip("|").split("|")[column].split(";")[0].strip(" *")
+def _rates(scenes: Drawn, *beside: tuple[Skin, Cover]) -> list[Rate]:
+    """Of both kits, and of sheets beside them."""
+    sheets = [(kit.skin, load_cover(kit.skin_path)) for kit in map(kits.kit, NAMES)]
+    with pool.executor() as workers:
+        return [counts.miscounted(*sheet, scenes, workers) for sheet in (*sheets, *beside)]
 
 
-def _sheet(kit: Kit) -> tuple[str, float, float, float]:
-    cover = load_cover(kit.skin_path)
-    assert cover is not None
-    return ("tiles", kit.skin.pitch_x_mm, cover.switch.force_n, round(1e3 * cover.thickness_m, 3))
+def counts_table() -> str:
+    rows = [(scenes.name, *(_share(rate) for rate in _rates(scenes))) for scenes in counts.SCENES]
+    return writer.table_of([("scenes", *NAMES), *rows])
 
 
-def _peak_row(way: str, found: list[KitFigures]) -> tuple[str, ...]:
-    title = f"[Peak force on a human arm](docs/arm.md#touches-anywhere) {PEAKS[way]}"
-    kits_n = (f"**{_peak(sheet, way)} N**, {sheet[-1]:g} mm of foam" for sheet in (_sheet(one.kit) for one in found))
-    paper_n = f"{_peak(PAPER_SHEET, way)} N with the paper's sheet, {PAPER_SHEET[-1]:g} mm of foam"
-    return title, *kits_n, paper_n
+def _share(rate: Rate) -> str:
+    low, high = rate.interval()
+    return f"{100 * rate.hits / rate.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
-def _peak(sheet: tuple[str, float, float, float], way: str) -> str:
-    """Worst / mean in N."""
-    with open(PLACES, encoding="utf-8", newline="") as file:
-        of = {(row["face"], *map(float, list(row.values())[1:4])): row for row in csv.DictReader(file)}
-    mean, worst = of[sheet][f"{way}: mean / worst, N"].split(" / ")
-    return f"{worst} / {mean}"
+def _peak_rows(found: list[KitFigures]) -> Iterator[tuple[str, ...]]:
+    study = kits_arm.study([(one.kit, one.finger) for one in found], BODIES, (1,))
+    with pool.executor() as workers:
+        peaks = {(each.sheet, each.body): halves for each, halves in anywhere.many(study, workers).items()}
+
+    def cell(sheet: str, way: str, mark: str = "") -> str:
+        texts = (anywhere.peak_text(peaks[sheet, body][anywhere.WAYS.index(way)]) for body in BODIES)
+        return ", ".join(f"{mark}{text} N{mark} {body}" for text, body in zip(texts, BODIES, strict=True))
+
+    for way, what in PEAKS.items():
+        kits_n = (cell(one.kit.name, way, "**") for one in found)
+        yield f"[Peak force](docs/arm.md#the-kits) {what}", *kits_n, f"{cell('paper', way)} with the paper's sheet"
 
 
 def times_table(found: list[KitFigures]) -> writer.Table:
@@ -190,7 +196,7 @@ def parts_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
 
 
-PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n")
+PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
 """Predictions that the page shows."""
 
 
@@ -203,6 +209,19 @@ def predictions_table() -> writer.Table:
         lines.append((f"`{key}`", any_one.what, any_one.unit, *cells))
     head = ("name", "what", "unit", *NAMES)
     return writer.Table(head, lines, lambda row: row[0].strip("`") in PREDICTED, head[1:])
+
+
+WIDE = 0.9
+"""Lowest factor of tolerances that the page does not show."""
+
+
+def tolerances_table() -> writer.Table:
+    rows = [
+        (one.what, f"{one.low:.3g} to {one.high:.3g}", one.source)
+        for one in (*predict.COVER.values(), *predict.CIRCUIT.values())
+    ]
+    wide = [one.what for one in predict.COVER.values() if one.low < WIDE]
+    return writer.Table(("times the stated value", "factor", "source"), rows, lambda row: row[0] in wide)
 
 
 def _interval(one: predictions.Prediction) -> str:

@@ -38,18 +38,18 @@ class Panel:
 
 
 def panels() -> list[Panel]:
-    """Some families' scenes with pressed switches; two fingers under every kind of cover."""
+    """Some families' scenes with pressed switches; two fingers as they press every kind of cover."""
     hand, foot = (_square(size, pitch) for size, pitch in ((32, 5.0), (64, 5.0)))
     drawn = [
         Panel(name, f"pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
         for name, skin, seed in (("fingers", hand, 6), ("palm", hand, 0), ("sole", foot, 3), ("edge", hand, 4))
     ]
     close = _square(18, 2.5)
-    pair = Scene(contacts.pair(7.0, 6.0, 21.0, 21.5, 30.0, force_n=20.0))
+    pair = Scene(contacts.pair(7.0, 6.0, 21.0, 21.5, 30.0, force_n=15.0))
     switch = Switch(0.32, 4e-6)  # closes at the stress of the paper's, whose face is wider than this pitch
-    names = {"patch": "patch", "point": "point force", "hertz": "patch's pressure", "bonded": "bonded layer"}
+    names = {"patch": "patch", "point": "point force", "foam": "foam, 5 mm"}
     return drawn + [
-        Panel(text, "20 N each, pitch 2.5 mm", pair, close, Cover(model, switch=switch))
+        Panel(text, "15 N each, pitch 2.5 mm", pair, close, Cover(model, switch=switch))
         for model, text in names.items()
     ]
 
@@ -74,7 +74,8 @@ def svg(drawn: Sequence[Panel]) -> str:
 
 
 def _panel(panel: Panel) -> list[str]:
-    truth = panel.scene.truth(0.0, panel.skin)
+    scene = panel.scene.on_cover(panel.skin, panel.cover)
+    truth = scene.truth(0.0, panel.skin)
     cells = panel.scene.pressed(0.0, panel.skin, panel.cover)
     left, right, top, bottom = (end / contacts.M for end in sheet(panel.skin))
     scale = PANEL / max(right - left, bottom - top)
@@ -93,7 +94,7 @@ def _panel(panel: Panel) -> list[str]:
         f'stroke="{OUTLINE}" stroke-width="1.5"/>'
         for one in truth.contacts
     ]
-    parts = [part for load in panel.scene.loads(0.0) for part in load.parts]
+    parts = [part for load in scene.loads(0.0) for part in load.parts]
     return [
         f'<text y="{LINE - 6 - HEAD}" font-weight="600">{html.escape(panel.title)}</text>',
         *(f'<text y="{(number + 2) * LINE - 6 - HEAD}">{line}</text>' for number, line in enumerate(told)),

@@ -6,12 +6,14 @@ x runs along the columns, y along the rows; cell (row 0, column 0) is at 0 mm; a
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.design.cover import Ball, Ellipse, Load, Part, Rectangle
+from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Indentation, Indenter, Load, Part, Rectangle
+from contactfpga.design.cover.layers import Layer
 
 Value = float | Callable[[float], float]
 """A number, or a function of time in s."""
@@ -70,7 +72,11 @@ class Contact:
     """An object that touches the sheet while its force is above 0."""
 
     shape: Shape | Callable[[float], Shape]
-    """Parts, or a function of time in s."""
+    """Parts: of a body as they are at its depth, else as they are pressed; or a function of time in s."""
+    body: str | Body | None = "finger"
+    """What presses, or its name in :data:`contactfpga.design.cover.BODIES`; None: the shape is as it is pressed."""
+    speed_mm_s: float | None = None
+    """Speed at which a body comes, from its first touch at 0 s until it has its force; None: it has it at once."""
     x_mm: Value
     """Origin of the shape along the columns."""
     y_mm: Value
@@ -89,6 +95,31 @@ class Contact:
         """Whether the contact is constant over time."""
         values = (getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "drag_n")
         return not any(map(callable, (*values, *self.drag_n)))
+
+    def on(self, cover: Cover | None, pitch_x_mm: float, pitch_y_mm: float) -> Contact:
+        """The contact as it is pressed on a cover over switches of this pitch.
+
+        On a bare sheet a body has its shape at any force, and comes like one with a finger's flesh.
+        """
+        if self.body is None or callable(self.shape):
+            return self
+        body = BODIES[self.body] if isinstance(self.body, str) else self.body
+        pitch = (pitch_x_mm * M, pitch_y_mm * M)
+        bare = cover is None or cover.model == "patch"
+        if bare and self.speed_mm_s is None:
+            return dataclasses.replace(self, body=None)
+        indentation = _indentation(None if bare else cover, self.shape, body, *pitch)
+        full_m: Value = body.depth_m if bare else PressedDepth(indentation, self.force_n)
+        if not bare and not callable(self.force_n):
+            full_m = indentation.depth_m(self.force_n)
+        if self.speed_mm_s is None:
+            shape = PressedParts(indentation, full_m)
+            return dataclasses.replace(self, body=None, shape=shape if callable(full_m) else shape(0.0))
+        if callable(full_m):
+            raise ValueError("the contact has a force of its own over time; it cannot approach as well")
+        depth_m = Approach(full_m, self.speed_mm_s * M)
+        force = PressedForce(indentation, depth_m, at(self.force_n, 0.0) / max(indentation.force_n(full_m), 1e-300))
+        return dataclasses.replace(self, body=None, shape=PressedParts(indentation, depth_m), force_n=force)
 
     def load(self, seconds: float) -> Load | None:
         """Load on the cover at a time; None without contact."""
@@ -140,74 +171,66 @@ def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class ChangingPatch:
-    """A ball's patch under a changing force: a disc of Hertz's radius."""
-
-    ball: Ball
-    force_n: Value
-
-    def __call__(self, seconds: float) -> Shape:
-        radius = self.ball.patch_m(at(self.force_n, seconds))
-        return (Ellipse(radius, radius),)
-
-
-BODY_PA = 2e5
-"""Effective modulus E* of a fingertip on soft foam: chosen, not measured."""
+@functools.lru_cache(maxsize=4096)
+def _indentation(cover: Cover | None, parts: Shape, body: Body, pitch_x_m: float, pitch_y_m: float) -> Indenter:
+    if cover is not None:
+        return cover.indentation(parts, body, pitch_x_m, pitch_y_m)
+    flesh = body.flesh or BODIES["finger"].flesh
+    assert flesh is not None
+    return Indentation(parts, body.depth_m, [Layer(2 * body.depth_m, flesh.modulus_pa)])
 
 
 @dataclasses.dataclass(frozen=True)
-class Rise:
-    """A force that rises from 0 s on: force_n (t / seconds)^(3/2), as of a round body at constant speed (Hertz)."""
+class Approach:
+    """Depth in m of a body that comes at constant speed from 0 s on."""
 
-    force_n: float
-    seconds: float
+    full_m: float
+    speed_m_s: float
+
+    @property
+    def seconds(self) -> float:
+        """Time until it has come."""
+        return self.full_m / self.speed_m_s
 
     def __call__(self, seconds: float) -> float:
-        return self.force_n * min(1.0, max(0.0, seconds) / self.seconds) ** 1.5
+        return min(self.full_m, self.speed_m_s * seconds)
 
 
 @dataclasses.dataclass(frozen=True)
-class GrowingPatch:
-    """Shape of a contact whose force is a :class:`Rise`: round parts grow as the force's cube root (Hertz), flat ones
-    are full at once."""
+class PressedDepth:
+    """Depth in m of a body under a changing force."""
 
-    shape: Shape
-    seconds: float
+    indentation: Indenter
+    force_n: Value
+
+    def __call__(self, seconds: float) -> float:
+        return self.indentation.depth_m(at(self.force_n, seconds))
+
+
+@dataclasses.dataclass(frozen=True)
+class PressedForce:
+    """Force of a body at a changing depth, times ``scale``."""
+
+    indentation: Indenter
+    depth_m: Value
+    scale: float
+
+    def __call__(self, seconds: float) -> float:
+        return self.scale * self.indentation.force_n(at(self.depth_m, seconds))
+
+
+@dataclasses.dataclass(frozen=True)
+class PressedParts:
+    """Parts of a body at a depth, which may change."""
+
+    indentation: Indenter
+    depth_m: Value
 
     def __call__(self, seconds: float) -> Shape:
-        share = math.sqrt(min(1.0, max(1e-6, seconds / self.seconds)))
-        return tuple(_shrunk(part, share) if isinstance(part, Ellipse) else part for part in self.shape)
+        return self.indentation.parts_at(max(SHALLOWEST_M, at(self.depth_m, seconds)))
 
 
-def _shrunk(part: Ellipse, share: float) -> Ellipse:
-    return dataclasses.replace(part, half_x_m=part.half_x_m * share, half_y_m=part.half_y_m * share)
-
-
-def approaching(contact: Contact, speed_mm_s: float) -> Contact:
-    """The contact, of fixed shape and force, arriving at 0 s at this speed until it has its force.
-
-    Its final indentation is 3 F / (4 E* sqrt(a b)) if round, F / (2 E* sqrt(A / pi)) if flat (Johnson 4.2, 3.5), with
-    E* = :data:`BODY_PA`; the deepest part counts.
-    """
-    if callable(contact.shape) or callable(contact.force_n):
-        raise ValueError("the contact has a force or a shape of its own over time; it cannot approach as well")
-    shares = Load(contact.shape, contact.force_n).shares()
-    seconds = max(_depth_m(part, force) for part, force in shares) / (speed_mm_s * M)
-    return dataclasses.replace(
-        contact, shape=GrowingPatch(contact.shape, seconds), force_n=Rise(contact.force_n, seconds)
-    )
-
-
-def _depth_m(part: Part, force_n: float) -> float:
-    if isinstance(part, Ellipse):
-        return 0.75 * force_n / (BODY_PA * math.sqrt(part.half_x_m * part.half_y_m))
-    return force_n / (2 * BODY_PA * math.sqrt(part.area_m2 / math.pi))
-
-
-def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contact:
-    """A ball whose patch grows with its force."""
-    return Contact(shape=ChangingPatch(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)
+SHALLOWEST_M = 1e-9
 
 
 def pair(

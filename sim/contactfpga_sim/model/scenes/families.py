@@ -6,6 +6,7 @@ scenes whatever their pitch, shifted with the sheet's corner.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import zlib
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Swing
@@ -24,6 +26,9 @@ FINGER_MM = 6.0
 HALF_MM, RATIO = (5.0, 10.0), (0.6, 1.0)
 """Range of half lengths of a finger's ellipse, and of its width over its length."""
 
+FINGERS_N = (2.0, 20.0)
+"""Range of a finger's force."""
+
 TRIES = 200
 """Places tried for another finger."""
 
@@ -31,7 +36,7 @@ Random = np.random.Generator
 
 
 def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """``count`` scenes of a family at random places on a sheet, from number ``first`` on.
+    """``count`` scenes of a family at random places, each on a sheet drawn for it, from number ``first`` on.
 
     ``family``: one of :data:`FAMILIES`; ``options``: those of its function, such as ``gap_mm``. Scene n depends only on
     family, options, seed, the sheet's pitch and size, and n. Raises ValueError for an unknown family or option.
@@ -41,18 +46,22 @@ def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, *
     if count < 0 or seed < 0 or first < 0:
         raise ValueError(f"count is {count}, seed is {seed}, first is {first}; each must be 0 or above")
     name = zlib.crc32(family.encode())
-    return [
-        FAMILIES[family](np.random.default_rng([name, seed, number]), skin, **options)
-        for number in range(first, first + count)
-    ]
+    found = []
+    for number in range(first, first + count):
+        scene = FAMILIES[family](np.random.default_rng([name, seed, number]), skin, **options)
+        drawn = int(np.random.default_rng([name, seed, number, 2]).integers(2**63))
+        found.append(dataclasses.replace(scene, drawn=drawn))
+    return found
 
 
 APPROACH_MM_S = (50.0, 250.0)
 """Speeds of approach, up to the reduced speed of ISO 10218-1: chosen."""
 
 
-def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
-    """:func:`placements` with rising forces: all contacts touch at 0 s and approach at one speed, drawn from
+def touches(
+    family: str, count: int, seed: int, skin: Skin, cover: Cover | None = None, first: int = 0, **options: Any
+) -> list[Scene]:
+    """:func:`placements` with rising forces on a cover: all contacts touch at 0 s and come at one speed, drawn from
     :data:`APPROACH_MM_S`, until ``settled_s``."""
     name = zlib.crc32(family.encode())
     scenes = placements(family, count, seed, skin, first, **options)
@@ -60,25 +69,28 @@ def touches(family: str, count: int, seed: int, skin: Skin, first: int = 0, **op
         float(np.random.default_rng([name, seed, number, 1]).uniform(*APPROACH_MM_S))
         for number in range(first, first + count)
     )
-    return [scene.approaching(speed) for scene, speed in zip(scenes, speeds, strict=True)]
+    return [scene.approaching(speed).on_cover(skin, cover) for scene, speed in zip(scenes, speeds, strict=True)]
 
 
 def bumper(rng: Random, skin: Skin) -> Scene:
     """An ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
     long = rng.uniform(8, 25)
     shape = contacts.ellipse(long, long * rng.uniform(0.4, 1))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(5, 50)),))
+    angle, force = rng.uniform(0, 180), rng.uniform(5, 50)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="forearm"),))
 
 
-def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scene:
-    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any angle, at least ``gap_mm`` apart, 2 to 20 N; fewer if
-    the sheet lacks room."""
+def fingers(
+    rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5, force_n: tuple[float, float] = FINGERS_N
+) -> Scene:
+    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any angle, at least ``gap_mm`` apart, each of a force in a
+    range; fewer if the sheet lacks room."""
     if gap_mm < 0 or most < 2:
         raise ValueError(f"gap_mm is {gap_mm} and most is {most}; they must be at least 0 and 2")
     placed: list[tuple[float, float, float]] = []
     found = []
     for _ in range(int(rng.integers(2, most + 1))):
-        long, shape, angle, force = _finger(rng)
+        long, shape, angle, force = _finger(rng, force_n=force_n)
         turned = tuple(part.placed(0.0, 0.0, math.radians(angle)) for part in shape)
         for _ in range(TRIES):
             x, y = place(rng, skin, turned)
@@ -98,11 +110,14 @@ def finger(
 
 
 def _finger(
-    rng: Random, half_mm: tuple[float, float] = HALF_MM, ratio: tuple[float, float] = RATIO
+    rng: Random,
+    half_mm: tuple[float, float] = HALF_MM,
+    ratio: tuple[float, float] = RATIO,
+    force_n: tuple[float, float] = FINGERS_N,
 ) -> tuple[float, Shape, float, float]:
     """Half length in mm, shape, angle in degrees and force in N."""
     long = rng.uniform(*half_mm)
-    return long, contacts.ellipse(long, long * rng.uniform(*ratio)), rng.uniform(0, 180), rng.uniform(2, 20)
+    return long, contacts.ellipse(long, long * rng.uniform(*ratio)), rng.uniform(0, 180), rng.uniform(*force_n)
 
 
 def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGER_MM) -> Scene:
@@ -116,19 +131,22 @@ def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGE
 def palm(rng: Random, skin: Skin) -> Scene:
     """A hand laid flat at any angle, 0.8 to 1.1 times its usual size, 20 to 80 N."""
     shape = contacts.palm(rng.uniform(0.8, 1.1))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 360), force_n=rng.uniform(20, 80)),))
+    angle, force = rng.uniform(0, 360), rng.uniform(20, 80)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="palm"),))
 
 
 def sole(rng: Random, skin: Skin) -> Scene:
     """A bare foot 220 to 280 mm long, within 30 degrees of the columns, 200 to 600 N."""
     shape = contacts.sole(rng.uniform(220, 280))
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(-30, 30), force_n=rng.uniform(200, 600)),))
+    angle, force = rng.uniform(-30, 30), rng.uniform(200, 600)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="palm"),))
 
 
 def edge(rng: Random, skin: Skin, width_mm: float = 12.0) -> Scene:
     """A bar 50 to 120 mm long and ``width_mm`` wide at any angle, 10 to 60 N."""
     shape = contacts.edge(rng.uniform(50, 120), width_mm)
-    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(10, 60)),))
+    angle, force = rng.uniform(0, 180), rng.uniform(10, 60)
+    return Scene((_anywhere(rng, skin, shape, angle, force_n=force, body="rigid"),))
 
 
 def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:

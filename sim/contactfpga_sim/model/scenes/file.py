@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.design.cover import BODIES, Cover
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts
-from contactfpga_sim.model.scenes.contacts import Contact, GrowingPatch, M, Shape, Track, Value, approaching
+from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Track, Value
 from contactfpga_sim.model.scenes.families import TRIES, Random, place
 from contactfpga_sim.model.scenes.scene import Scene, around_m, sheet
 from contactfpga_sim.model.scenes.truth import Box, on_all_turns, widths
@@ -63,6 +64,8 @@ class Kind:
 
     shape: str
     sizes: tuple[tuple[str, Range], ...]
+    body: str = "finger"
+    """Name of what presses, of :data:`contactfpga.design.cover.BODIES`, which has the shape at its depth."""
     number: tuple[int, int] = (1, 1)
     """Range of their number in a scene."""
     x_mm: Range | Track | None = None
@@ -151,6 +154,8 @@ def _kind(where: str, given: Any) -> Kind:
     for name, ends in fixed.items():
         if name in values:
             values[name] = _range(f"{where}: {name}", values[name], *ends)
+    if (body := values.get("body", "finger")) not in BODIES:
+        raise SceneFileError(f"{where}: body is {shown(body)}; it must be one of {', '.join(BODIES)}")
     if "speed_mm_s" in values and any(isinstance(values.get(name), Track) for name in ("x_mm", "y_mm")):
         raise SceneFileError(f"{where} has speed_mm_s and a track; leave one of them out")
     if "approach_mm_s" in values and isinstance(values.get("force_n"), Track):
@@ -227,8 +232,8 @@ PLACES = 10
 """Places tried for a contact before the whole scene is drawn again."""
 
 
-def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
-    """Scene ``number`` of a file on a sheet, and its sampling instant in s, after all approaches.
+def scene_of(file: SceneFile, number: int, skin: Skin, cover: Cover | None = None) -> tuple[Scene, float]:
+    """Scene ``number`` of a file on a sheet under a cover, and its sampling instant in s, after all approaches.
 
     The file's content, the number, and the sheet's pitch and size decide. Raises SceneFileError if contacts do not fit
     as far apart as requested.
@@ -236,7 +241,7 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     rng = np.random.default_rng([file.seed, number])
     for _ in range(TRIES):
         if (contacts := _apart(rng, file, skin)) is not None:
-            scene = Scene(contacts)
+            scene = Scene(contacts, int(rng.integers(2**63))).on_cover(skin, cover)
             return scene, max(scene.settled_s, float(rng.uniform(0, file.seconds)))
     left, right, top, bottom = (end / M for end in sheet(skin))
     assert file.gap_mm is not None
@@ -265,9 +270,8 @@ def _start(contact: Contact) -> Shape:
     x, y, angle = (
         value(0.0) if callable(value) else value for value in (contact.x_mm, contact.y_mm, contact.angle_deg)
     )
-    shape = contact.shape.shape if isinstance(contact.shape, GrowingPatch) else contact.shape
-    assert not callable(shape)
-    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in shape)
+    assert not callable(contact.shape)
+    return tuple(part.placed(x * M, y * M, math.radians(angle)) for part in contact.shape)
 
 
 def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
@@ -277,14 +281,15 @@ def _drawn(rng: Random, file: SceneFile, kind: Kind, skin: Skin) -> Contact:
     x, y = place(rng, skin, turned)
     speed, heading = kind.speed_mm_s.draw(rng), math.radians(kind.heading_deg.draw(rng))
     left, _, top, _ = (end / M for end in sheet(skin))
-    drawn = Contact(
+    return Contact(
         shape=shape,
+        body=kind.body,
         x_mm=_along(rng, kind.x_mm, left, x, speed * math.cos(heading), file.seconds),
         y_mm=_along(rng, kind.y_mm, top, y, speed * math.sin(heading), file.seconds),
         angle_deg=angle,
         force_n=force,
+        speed_mm_s=None if kind.approach_mm_s is None else kind.approach_mm_s.draw(rng),
     )
-    return drawn if kind.approach_mm_s is None else approaching(drawn, kind.approach_mm_s.draw(rng))
 
 
 def _value_of(rng: Random, value: Range | Track) -> Value:

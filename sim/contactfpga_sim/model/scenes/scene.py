@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -34,6 +35,8 @@ class Scene:
     beyond one end is also at the other."""
 
     contacts: tuple[Contact, ...]
+    drawn: int = 0
+    """Seed of the closing forces of the sheet that is touched, where a cover spreads them."""
 
     def loads(self, seconds: float) -> list[Load]:
         """Loads on the cover at a time."""
@@ -51,13 +54,20 @@ class Scene:
 
     @property
     def settled_s(self) -> float:
-        """Time by which all approaches have their forces; 0 without any."""
-        rises = (contact.force_n for contact in self.contacts)
-        return max((rise.seconds for rise in rises if isinstance(rise, contacts.Rise)), default=0.0)
+        """Time by which all bodies that come to a sheet have their forces, of a scene :meth:`on_cover`; 0 without
+        any."""
+        shapes = (contact.shape for contact in self.contacts)
+        depths = (shape.depth_m for shape in shapes if isinstance(shape, contacts.PressedParts))
+        return max((depth.seconds for depth in depths if isinstance(depth, contacts.Approach)), default=0.0)
+
+    def on_cover(self, skin: Skin, cover: Cover | None = None) -> Scene:
+        """The scene as its bodies are pressed on a cover (None: a bare sheet) over switches of the Skin's pitch."""
+        return _on_cover(self, skin.pitch_x_mm, skin.pitch_y_mm, cover)
 
     def approaching(self, speed_mm_s: float) -> Scene:
-        """The scene with all contacts touching at 0 s and approaching at this speed."""
-        return Scene(tuple(contacts.approaching(contact, speed_mm_s) for contact in self.contacts))
+        """The scene with all bodies touching at 0 s and coming at this speed."""
+        coming = tuple(dataclasses.replace(contact, speed_mm_s=speed_mm_s) for contact in self.contacts)
+        return dataclasses.replace(self, contacts=coming)
 
     def pressed(
         self, seconds: float, skin: Skin, cover: Cover | None = None, before: np.ndarray | None = None
@@ -65,13 +75,13 @@ class Scene:
         """(rows, columns) bool: closed switches at a time. ``cover``: None for a bare sheet, whose switches close under
         a contact whatever its force. ``before``: switches closed until then, for hysteresis. ``skin.mask`` is ignored,
         as the gateware applies it."""
-        loads = self.loads(seconds)
+        loads = self.on_cover(skin, cover).loads(seconds)
         if skin.closed:
             loads = all_loads(loads, sheet(skin).left, around_m(skin))
         pitch_x, pitch_y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
         if cover is not None and cover.model != "patch":
-            return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y).closed(loads, before)
-        return (cover or Cover()).closed(
+            return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y, self.drawn).closed(loads, before)
+        return (cover or Cover()).under(
             loads, np.arange(skin.columns) * pitch_x, np.arange(skin.rows)[:, None] * pitch_y
         )
 
@@ -91,6 +101,12 @@ class Scene:
             return before
 
         return remembering
+
+
+@functools.lru_cache(maxsize=4096)
+def _on_cover(scene: Scene, pitch_x_mm: float, pitch_y_mm: float, cover: Cover | None) -> Scene:
+    pressed = tuple(contact.on(cover, pitch_x_mm, pitch_y_mm) for contact in scene.contacts)
+    return dataclasses.replace(scene, contacts=pressed)
 
 
 def sheet(skin: Skin) -> Box:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import datetime
 import math
-import re
 import statistics
 import sys
 from collections.abc import Iterator
@@ -34,7 +33,8 @@ from contactfpga.tools.console import flags, interrupt, numbers, outputs, result
 
 EXTRA = None
 
-CLOSING = re.compile(r"closing_\w+_n")
+CLOSING = "closing_rod_n"
+"""Closing forces of a rod: a finger's tell the finger as much as the switch."""
 SECONDS = 300.0
 """Default longest duration of each step with touches."""
 COUNTED_S = 2.0
@@ -126,7 +126,7 @@ def _medians(measured: list[tuple[str, float]]) -> dict[str, float]:
 
 
 def _closing(measured: list[tuple[str, float]]) -> list[tuple[str, float]]:
-    return [(name, value) for name, value in measured if CLOSING.fullmatch(name)]
+    return [(name, value) for name, value in measured if name == CLOSING]
 
 
 def _force(

@@ -17,8 +17,9 @@ from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup.bench import Step
 
 NOT_FITTED = (
-    "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a fingertip on one "
-    "switch after the other, and give three or more of the forces at which they close: --measured closing_0_n=0.42 ..."
+    "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a rod of 4 mm on the "
+    "middle of one cap after the other, and give three or more of the forces at which they close: "
+    "--measured closing_rod_n=0.42 ..."
 )
 
 

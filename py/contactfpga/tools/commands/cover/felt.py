@@ -8,6 +8,7 @@ from contactfpga.design import kits
 from contactfpga.design.cover import felt as touches
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.felt import Felt, Force, Sheet
+from contactfpga.design.cover.layers import BODIES, Layer
 from contactfpga.design.cover.press import Cover, load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin
@@ -23,9 +24,10 @@ M = 1e-3
 def add_flags(flag: flags.Flags) -> None:
     flag("[SKIN]", "TOML file of a Skin with a table [cover].")
     flags.kit(flag)
-    finger = flag.group("finger, an ellipse whose size does not depend on its force")
-    finger("--length M", "Its length.", cover.LENGTH, touches.LENGTH_M)
-    finger("--width M", "Its width.", cover.LENGTH, touches.WIDTH_M)
+    finger = flag.group("what presses, an ellipse that grows with its force")
+    finger("--body NAME", "What it is.", tuple(BODIES), touches.BODY.name)
+    finger("--length M", "Its length at the body's depth.", cover.LENGTH, touches.LENGTH_M)
+    finger("--width M", "Its width there.", cover.LENGTH, touches.WIDTH_M)
     places = "Places of it, spread evenly over the sheet."
     finger("--places N", places, numbers.whole(1, touches.MOST_PLACES), touches.PLACES)
     rest = flag.group("what presses though nothing touches")
@@ -50,10 +52,11 @@ def run(args: argparse.Namespace) -> int:
             "give [cover] with a model that goes by stress, as examples/tiles.toml does"
         )
     found = touches.feel(
-        *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed)
+        *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed),
+        BODIES[args.body],
     )
     unsolved = any(isinstance(force, NoSolution) for force in (found.half, found.most, found.worst))
-    answer = {"finger": {"length_m": args.length, "width_m": args.width}} | vars(found)
+    answer = {"finger": {"body": args.body, "length_m": args.length, "width_m": args.width}} | vars(found)
     results.show(args, answer, lambda: _print(found, laid, args))
     return UNSOLVED if unsolved else 0
 
@@ -64,12 +67,15 @@ def _sheet(skin: Skin) -> Sheet:
 
 def _print(found: Felt, laid: Cover, args: argparse.Namespace) -> None:
     x, y = (MM * place for place in found.worst_m)
-    size = f"an ellipse of {MM * args.length:g} x {MM * args.width:g} mm"
+    body = BODIES[args.body]
+    size = f"{body.name}, {MM * args.length:g} x {MM * args.width:g} mm at a depth of {MM * body.depth_m:g} mm"
     forces = f"{laid.switch.force_n:g} N"
     if found.sheets > 1:
         forces += f", {100 * laid.switch.spread:g} % spread; 95 % of {found.sheets} drawn sheets in parentheses"
     results.table(
-        ("finger", f"{size}, at {found.places} places and angles"),
+        ("what presses", f"{size}, at {found.places} places and angles"),
+        ("its flesh", _layer(body.flesh)),
+        ("foam", _layer(Layer(laid.thickness_m, laid.modulus_pa))),
         ("a switch closes at", forces),
         ("50 % of touches felt from", _force(found.half)),
         ("99 % of touches felt from", _force(found.most)),
@@ -80,6 +86,10 @@ def _print(found: Felt, laid: Cover, args: argparse.Namespace) -> None:
         ),
         ("false presses, expected", f"{found.false_presses:.2g}" if found.false_presses >= 1e-9 else "0"),
     )
+
+
+def _layer(layer: Layer | None) -> str:
+    return "rigid" if layer is None else f"{MM * layer.thickness_m:g} mm, {1e-3 * layer.modulus_pa:.3g} kPa at first"
 
 
 def _share(share: float) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga import terminal
+from contactfpga.design.cover import BODIES, load_cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs, results
@@ -28,7 +29,9 @@ def add_flags(flag: flags.Flags) -> None:
     flag("--latency-us US", usual, numbers.number(0, 1e7, "us"), 6000.0)
     places = "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place)."
     flag("--places N", places, numbers.whole(0, 10_000))
-    flag("--skin FILE", "Skin of the sheet (default: the reference Skin).")
+    flag("--skin FILE", "Skin of the sheet, with its [cover] if it has one (default: the reference Skin).")
+    bodies = f"What the arm runs into: {', '.join(BODIES)} (default: the case's)."
+    flag("--body BODY", bodies, tuple(BODIES))
     flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
     flag("--charts", "Draw force against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
@@ -43,6 +46,10 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.lab.arm.case import Case
 
     case = Case.load(args.case)
+    if args.skin and (cover := load_cover(args.skin)):
+        case, args.case = case.wearing(cover), f"{args.case} under {args.skin}"
+    if args.body:
+        case, args.case = case.but(body=args.body), f"{args.case} against {args.body}"
     if args.regions:
         return _regions(args, case)
     if args.charts:
@@ -64,7 +71,7 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
     count = args.places if args.places is not None else PLACES * (len(case.touch) == 1)
     touched = _anywhere(args, case, skin or Skin(), count) if count else None
     if folder is not None and touched is not None:
-        tables.show(anywhere.lines(case, touched, late), title=f"Case {args.case}: touches anywhere on the sheet")
+        tables.show(anywhere.lines(touched, late), title=f"Case {args.case}: touches anywhere on the sheet")
     found = report.columns(case, args.case, 1e-6 * args.latency_us, skin)
     if folder is None:
         known = report.as_json(found, args.case)
