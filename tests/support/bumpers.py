@@ -98,24 +98,38 @@ def scattered(rng, count):
             return points, normals
 
 
+def placed(rng, count, kind):
+    """Places with their normals: "scattered" over a cylinder, in a "line", "near" to each other down to 1 um, with
+    "parallel" or "opposed" normals, or "stacked" along their common normal."""
+    points, normals = scattered(rng, count)
+    if kind in ("line", "near", "stacked"):
+        way = {"line": direction(rng), "near": rng.standard_normal((count, 3)), "stacked": normals[0]}[kind]
+        points = points[0] + way * rng.uniform(-1, 1, (count, 1)) * 10 ** rng.uniform(-6, -1)
+    if kind in ("parallel", "opposed", "stacked"):
+        normals = normals[0] * np.where((rng.random(count) < 0.5) & (kind == "opposed"), -1, 1)[:, None]
+    return points, normals
+
+
 def solved(points, normals, loaded, friction=0.5, **how):
-    """The contacts at these places."""
-    return contacts(loaded, [touch(*pair, friction) for pair in zip(points, normals)], **how)
+    """The contacts at these places, with one friction or with one each."""
+    each = zip(points, normals, np.broadcast_to(friction, len(points)).tolist())
+    return contacts(loaded, [touch(*one) for one in each], **how)
 
 
 def clarabel_cones(points, normals, friction):
-    """(6, 3k) matrix from forces to the wrench, k times (3k,) pushes, and Clarabel's cones of friction (None: of any)
-    with their rows."""
+    """(6, 3k) matrix from forces to the wrench, k times (3k,) pushes, and Clarabel's cones of friction (one, or one
+    each; None: of any) with their rows."""
     import clarabel
 
     count = len(points)
     matrix = np.hstack([np.vstack([np.eye(3), np.cross(p, np.eye(3)).T]) for p in points])
     pushes = [-np.ravel(np.eye(count)[at][:, None] * normals) for at in range(count)]
     rows, cones = [], []
-    for normal, push, at in zip(normals, pushes, np.eye(count)):
+    for normal, push, at, mu in zip(normals, pushes, np.eye(count), np.broadcast_to(friction, count)):
         sides = np.kron(at, np.eye(3) - np.outer(normal, normal))
-        rows += [push[None]] if friction is None else [friction * push[None], sides]
-        cones.append(clarabel.NonnegativeConeT(1) if friction is None else clarabel.SecondOrderConeT(4))
+        rows += [push[None] * (mu or 1), *([] if mu is None else [sides])]
+        pushing = [clarabel.NonnegativeConeT(1), *([] if mu is None else [clarabel.ZeroConeT(3)])]
+        cones += [clarabel.SecondOrderConeT(4)] if mu else pushing
     return matrix, pushes, rows, cones
 
 

@@ -42,7 +42,7 @@ LARGEST = 1e3
 ANY_FRICTION = 100.0
 """Friction whose cones leave out hardly any force that pushes."""
 
-SMALLEST = 1e-9
+SMALLEST = 1e-11
 """Weight of the squared forces against their squared misfit, where both count."""
 
 FOUND = 1e-6

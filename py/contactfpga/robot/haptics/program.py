@@ -8,6 +8,7 @@ cones, and many programs with the same cones and equations run at once.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contactfpga.surfaces.shapes import Floats
 
@@ -24,6 +25,9 @@ BACK = 0.99
 
 ROUNDING = 1e-15
 """Regularization of a matrix with unit diagonal."""
+
+FAR = 1e6
+"""Size of x up to which none is left out where a program has no solution."""
 
 
 class Program:
@@ -62,7 +66,7 @@ class Program:
             error = np.maximum(gap, np.maximum(np.abs(off).max(axis=1), np.abs(rest).max(axis=(1, 2))))
             error = error / (1 + np.abs((slopes * x).sum(axis=(1, 2))))
             better = error < errors
-            going = (better | (error > LATE)) & (error > ENOUGH)
+            going = (better | (error > LATE)) & (error > ENOUGH) & ~self._hopeless(z, y)
             best, gains = (np.where(better[:, None, None], *both) for both in ((x, best), (z, gains)))
             errors = np.where(better, error, errors)
             if not going.any():
@@ -77,6 +81,14 @@ class Program:
 
     def _pulled(self, y: Floats) -> Floats:
         return np.asarray(y @ self._columns.reshape(-1, len(self._wanted)).T).reshape(-1, *self._columns.shape[:2])
+
+    def _hopeless(self, z: Floats, y: Floats) -> NDArray[np.bool_]:
+        """(m,): whether y proves that x A, for x in the cones, comes no nearer to ``wanted`` than by ten times LATE.
+
+        For x A = ``wanted`` - e, x z >= 0 and hence ``wanted`` y <= e y + x (A y + z).
+        """
+        off = np.abs(self._pulled(y) + z).max(axis=(1, 2))
+        return np.asarray(y @ self._wanted > FAR * off + 10 * LATE * np.abs(y).sum(axis=1))
 
     def _curved(self, x: Floats) -> Floats | float:
         return 0.0 if self._square is None else self._square * x

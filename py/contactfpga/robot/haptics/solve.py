@@ -141,8 +141,6 @@ def distinct(touches: Sequence[Touch]) -> None:
 Closed = tuple[list[Vector], list[list[float]], float | None, bool]
 """Forces, null space, chi-square, and whether they are beyond friction."""
 
-AXES: tuple[Vector, ...] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-
 
 def _one(wrench: Wrench, touch: Touch) -> Closed | None:
     """The closed form of one contact, of any friction; None if it pulls."""
@@ -187,14 +185,15 @@ def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
         return force, None
     sides = np.array((0.0, z, -y, 1.0, 0.0, 0.0, -z, 0.0, x, 0.0, 1.0, 0.0, y, -x, 0.0, 0.0, 0.0, 1.0)).reshape(3, 6)
     both = sides @ wrench.noise.covariance
+    (a, b, c), (_, d, e), (_, _, f) = (both @ sides.T).tolist()
+    u, v, w = (touch.point_sigma_m * part for part in force)
+    a, b, c, d, e, f = a + v * v + w * w, b - u * v, c - u * w, d + u * u + w * w, e - v * w, f + u * u + v * v
+    first, second, third = d * f - e * e, c * e - b * f, b * e - c * d  # of the adjugate
+    mixed = b * c - a * e
+    adjugate = (first, second, third), (second, a * f - c * c, mixed), (third, mixed, a * d - b * b)
     rest = _plus(wrench.moment_nm, -1.0, cross(touch.point_m, force))
-    moved = touch.point_sigma_m * force[0], touch.point_sigma_m * force[1], touch.point_sigma_m * force[2]
-    square = dot(moved, moved)
-    spread = zip((both @ sides.T).tolist(), AXES, moved)
-    first, second, third = [_plus(_plus(row, square, axis), -part, moved) for row, axis, part in spread]
-    inverse = cross(second, third), cross(third, first), cross(first, second)
-    over = 1 / dot(first, inverse[0])
-    shares = [over * dot(row, rest) for row in inverse]
+    over = 1 / (a * first + b * second + c * third)
+    shares = [over * dot(row, rest) for row in adjugate]
     for share, row in zip(shares, both.tolist()):
         force = _plus(force, -share, row)
     return force, dot(rest, shares)
