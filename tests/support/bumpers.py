@@ -104,7 +104,8 @@ def placed(rng, count, kind):
     points, normals = scattered(rng, count)
     if kind in ("line", "near", "stacked"):
         way = {"line": direction(rng), "near": rng.standard_normal((count, 3)), "stacked": normals[0]}[kind]
-        points = points[0] + way * rng.uniform(-1, 1, (count, 1)) * 10 ** rng.uniform(-6, -1)
+        away = (np.arange(count) + rng.uniform(0, 0.5, count)) * 10 ** rng.uniform(-6, -1.5)
+        points = points[0] + away[:, None] * way
     if kind in ("parallel", "opposed", "stacked"):
         normals = normals[0] * np.where((rng.random(count) < 0.5) & (kind == "opposed"), -1, 1)[:, None]
     return points, normals
