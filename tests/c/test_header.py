@@ -279,7 +279,7 @@ class History:
         return first + b"".join(self.line(self.packet()) for _ in range(packets))
 
 
-@pytest.mark.parametrize("seed", sample(range(400), quick=range(6)))
+@pytest.mark.parametrize("seed", sample(range(40), quick=range(6)))
 def test_c_and_python_agree_on_random_histories(decoder, seed):
     data = History(seed).stream(300)
     assert by_c(decoder, data) == by_python(data)

@@ -96,7 +96,7 @@ def test_a_reader_has_the_first_frame_at_once_and_may_end_first(board, form, sho
         assert any(shows in line for line in iter(process.stdout.readline, ""))
         assert process.poll() is None
         process.stdout.close()
-        assert process.wait(60) == 0
+        assert process.wait() == 0
         assert process.stderr.read() == ""
 
 

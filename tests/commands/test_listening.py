@@ -10,7 +10,6 @@ from net_processes import Child, free_endpoint
 import contactfpga
 
 SKIN = contactfpga.Skin(name="left")
-LONG = 60.0
 
 PROGRAM = """
 import contextlib, ipaddress, json, os, socket, stat, sys, threading, time
@@ -78,7 +77,7 @@ def test_no_command_listens_but_on_this_computer(tmp_path):
     ]
     with Child("-c", PROGRAM, json.dumps(commands), wait=False) as child:
         found = sockets(child, lambda now: len([one for one in now if one[4]]) >= 2 and any(one[0] for one in now))
-        wait_until(lambda: all(board.asked for board in boards.values()), LONG)
+        wait_until(lambda: all(board.asked for board in boards.values()))
         found = sockets(child, lambda now: True)
     for board in boards.values():
         board.close()

@@ -121,7 +121,7 @@ def test_the_live_view_of_a_large_sheet_stays_on_the_screen(columns, lines):
         board.stream = board.frame
         patient = ["zones", board.path, "--timeout", "60"]  # a busy machine lets the board wait
         on = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *patient], columns, lines)
-        wait_until(lambda: on.process.poll() is not None or on.said.count("cells pressed") > 2, 120)
+        wait_until(lambda: on.process.poll() is not None or on.said.count("cells pressed") > 2)
         on.type("\x03")
         assert on.wait() == 0
     frames = re.split(r"\x1b\[2K(?:\x1b\[1A\x1b\[2K)+|\x1b\[\?25l", on.said)

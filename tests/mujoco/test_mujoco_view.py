@@ -13,7 +13,7 @@ import contactfpga
 from contactfpga.tools.view import chart, obstacle, opening
 from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
-from contactfpga_sim.lab.mujoco.clip import Asked
+from contactfpga_sim.lab.mujoco.clip import SteppedPace
 from contactfpga_sim.lab.view import browser
 
 HERE = contactfpga.examples() / "arm"
@@ -25,7 +25,7 @@ X_MM = 6 * 2 * np.pi * 38 / 24
 def started(reflex, skin=KIT, angle=None):
     """The arm of the example at an angle, which goes on as far as it is told."""
     source = SimulatedSource(ROBOT, SCENE, REFLEXES)
-    source.pace, source.reflex, source.skin = Asked(0.0), reflex, skin
+    source.pace, source.reflex, source.skin = SteppedPace(0.0), reflex, skin
     source.restart()
     source.advance()
     for copy in source.copies if angle is not None else ():
@@ -228,7 +228,7 @@ def test_bad_words_get_one_line(words, said, tmp_path, monkeypatch):
 
 def run_model(seconds):
     source = SimulatedSource(ROBOT, "model.xml")
-    source.pace = Asked(0.0)
+    source.pace = SteppedPace(0.0)
     assert "arm" in {one.link for one in source.solids()}, "terrain, of number 0 as well, is no mesh"
     goes_on(source, seconds)
     source.close()
@@ -292,7 +292,7 @@ def test_a_click_in_a_browser_stops_the_arm():
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         source = shown.source
         browser.tidy(visitor)  # its notice covers the arm
-        source.pace = pace = Asked(0.0)
+        source.pace = pace = SteppedPace(0.0)
 
         def command():
             copies = source.copies  # none while it starts again

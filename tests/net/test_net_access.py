@@ -170,7 +170,7 @@ def test_commands_and_what_no_host_sends_do_not_reach_the_board(endpoint):
         with contactfpga.open(port(endpoint), timeout=LONG) as board, session.connected(endpoint) as stranger:
             for data in (command, b"\0\1\2\3\0", bytes(MOST_ASKED + 1), b"", command + bytes(1000)):
                 stranger.put("left/ask", data)
-            wait_until(lambda: board.stats.net.denied == 5, LONG)
+            wait_until(lambda: board.stats.net.denied == 5)
             assert board.read(LONG)
     assert source.commanded == []
 
@@ -219,9 +219,9 @@ def test_what_is_far_too_large_goes_no_further(endpoint):
     found = []
     with session.listening(endpoint) as network, session.connected(endpoint) as sender:
         network.declare_subscriber("left/ask", lambda sample: found.append(len(sample.payload)))
-        wait_until(lambda: sender.put("left/ask", b"x") or found, LONG)
+        wait_until(lambda: sender.put("left/ask", b"x") or found)
         sender.put("left/ask", bytes(20 << 20))
-        wait_until(lambda: sender.put("left/ask", b"xy") or 2 in found, LONG)
+        wait_until(lambda: sender.put("left/ask", b"xy") or 2 in found)
         time.sleep(0.1)
     assert set(found) == {1, 2}
 

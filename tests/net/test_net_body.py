@@ -44,7 +44,7 @@ def board(skin=SKIN):
 def answered(opened, *names):
     """The first snapshot in which these links answer, and no other one: any may have to wait for the processor."""
     found = []
-    wait_until(lambda: found.append(opened.read(LONG)) or found[-1].answering == names, LONG)
+    wait_until(lambda: found.append(opened.read(LONG)) or found[-1].answering == names)
     return found[-1]
 
 
@@ -58,7 +58,7 @@ def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, cap
             opened = Body.load(robot).open(timeout=LONG)
             answered(opened, "left", "right")
         with opened:
-            wait_until(lambda: opened.latest().links["left"].status == "lost", LONG)
+            wait_until(lambda: opened.latest().links["left"].status == "lost")
             snapshot = answered(opened, "right")
             with pytest.raises(NoLinkData, match=r"left.*(is gone: its publisher ended|nobody publishes it)"):
                 snapshot.contacts("link")
@@ -66,9 +66,9 @@ def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, cap
             with published(board(), network, "robot/left"):
                 assert [one.link for one in answered(opened, "left", "right").contacts("link")] == ["left", "right"]
             with published(board(SKIN.replace(pitch_x_mm=20.0)), network, "robot/left"):
-                wait_until(lambda: opened.latest().links["left"].status == "mismatch", LONG)
+                wait_until(lambda: opened.latest().links["left"].status == "mismatch")
                 assert "was built from" in opened.latest().links["left"].reason
-            wait_until(lambda: opened.latest().links["right"].status == "ok", LONG)
+            wait_until(lambda: opened.latest().links["right"].status == "ok")
 
 
 def test_links_that_nobody_publishes_are_lost_and_leave_nothing_behind(robot, endpoint, monkeypatch):
@@ -87,6 +87,6 @@ def test_links_that_nobody_publishes_are_lost_and_leave_nothing_behind(robot, en
         with opened:
             counts = []
             for number in (4, 24):
-                wait_until(lambda number=number: len(tries) >= number, LONG)
+                wait_until(lambda number=number: len(tries) >= number)
                 counts.append(psutil.Process().num_fds())
     assert counts[1] < counts[0] + 10

@@ -45,12 +45,12 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch, endpoi
         sent = source.sent
         source.go(2000.0)
         enough = lambda: source.overflowed > 200 if block else board.stats.net.lost_messages > 10  # noqa: E731
-        wait_until(lambda: source.sent - sent >= 3000 and enough(), LONG)
+        wait_until(lambda: source.sent - sent >= 3000 and enough())
         source.go(0.0)
         relay.bytes_s = 10**7
         assert settled(source, board) == unknown, "every frame came, or is counted"
         sends.end()
-        wait_until(lambda: last_message(board) == sends.sent - 1, LONG)
+        wait_until(lambda: last_message(board) == sends.sent - 1)
         stats, net = board.stats, board.stats.net
     assert stats.restarts == net.refused == 0
     assert stats.lost > 100
@@ -87,6 +87,6 @@ def last_message(board):
 def settled(source, board):
     """Frames that the board has sent and the reader does not know of, once a hello has come that counts them all."""
     # Over and over, as a network that is still slow drops it.
-    wait_until(lambda: source.say_hello() or board.hello.sent == source.sent, LONG, pause_s=0.3)
+    wait_until(lambda: source.say_hello() or board.hello.sent == source.sent, pause_s=0.3)
     stats = board.stats
     return source.sent - stats.frames - stats.lost - stats.unexplained

@@ -28,7 +28,7 @@ def first_message(network):
     """One that the publisher sends."""
     found = []
     subscriber = network.declare_subscriber(f"{KEY}/bytes", lambda one: found.append(one.payload.to_bytes()))
-    wait_until(lambda: found, LONG)
+    wait_until(lambda: found)
     subscriber.undeclare()
     return Message.decode(found[0])
 

@@ -44,7 +44,7 @@ def take(board, count, sent_us):
 
 
 def take_until(board, condition, sent_us):
-    wait_until(lambda: take(board, 5, sent_us) or condition(), LONG)
+    wait_until(lambda: take(board, 5, sent_us) or condition())
 
 
 def test_a_published_board_is_a_board(streaming, endpoint):
@@ -101,7 +101,7 @@ def pass_on(streaming):
     """Wait until the publisher has sent frames that come from now on; ``streaming`` waits for it to read them."""
     for _ in range(2):  # it reads again once it has sent
         sent = streaming.sent
-        wait_until(lambda sent=sent: streaming.sent > sent + 100 and not streaming.waiting(), LONG)
+        wait_until(lambda sent=sent: streaming.sent > sent + 100 and not streaming.waiting())
 
 
 @pytest.mark.slow

@@ -366,7 +366,7 @@ def test_a_rate_is_judged_wrong_at_most_once_in_twenty(share, wrong):
     def draws(value, rng, count):
         return [Outcome(bool(right)) for right in rng.random(count) < share]
 
-    verdicts = [knobs.Rated(draws, seed)(0.0).right for seed in range(300)]
+    verdicts = [knobs.RateTest(draws, seed)(0.0).right for seed in range(300)]
     assert verdicts.count(not wrong) <= 15 + 3 * 15**0.5
 
 
@@ -375,7 +375,7 @@ def test_of_many_draws_the_wrong_one_that_is_not_told_is_shown():
     right = Outcome(True, ("motion",), "right")
 
     def of(*each):
-        return knobs.Rated(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
+        return knobs.RateTest(lambda value, rng, count: [*each, *([right] * count)][:count])(0.0)
 
     assert (of().right, of().told, of().what, of().rate) == (True, ("motion",), "right", "100 % (95.0 to 100.0)")
     assert of(*[told] * 20).told == ("row N open",)

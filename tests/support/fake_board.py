@@ -15,10 +15,9 @@ from model_board import ZONE as ZONE
 from model_board import ModelBoard
 
 
-def wait_until(condition, seconds=60.0, pause_s=0.002):
-    deadline = time.monotonic() + seconds
+def wait_until(condition, pause_s=0.002):
+    """The test's own timeout ends it if the condition never comes: a busy machine may take long."""
     while not condition():
-        assert time.monotonic() < deadline, "did not come about"
         time.sleep(pause_s)
 
 

@@ -56,14 +56,14 @@ class OnTerminal:
     def type(self, text):
         os.write(self._master, text.encode())
 
-    def wait(self, seconds=60):
-        status = self.process.wait(seconds)
-        self._reader.join(60)  # it may have to wait for the processor
+    def wait(self):
+        status = self.process.wait()
+        self._reader.join()
         os.close(self._master)
         return status
 
 
-def on_terminal(arguments, columns, seconds=120, **variables):
+def on_terminal(arguments, columns, **variables):
     """Status and output of a contactfpga command on a terminal so wide."""
     terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *map(str, arguments)], columns, **variables)
-    return terminal.wait(seconds), terminal.said
+    return terminal.wait(), terminal.said

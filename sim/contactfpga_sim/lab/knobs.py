@@ -1,6 +1,6 @@
 """Knobs: parameters, with results at their values.
 
-A scene that is drawn is judged by :class:`Rated`: draws go on until it is clear whether enough of them are right.
+A scene that is drawn is judged by :class:`RateTest`: draws go on until it is clear whether enough of them are right.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ Draws = Callable[[float, np.random.Generator, int], Sequence[Outcome]]
 
 
 @dataclasses.dataclass(frozen=True)
-class Rated:
+class RateTest:
     """A knob's method in as many draws as the decision needs.
 
     A value holds if the interval is above the level; it fails if below, or still undecided after ``most`` draws. All

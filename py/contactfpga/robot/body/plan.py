@@ -21,7 +21,7 @@ from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.robot.body.folds import Folds
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.state import BodyError
-from contactfpga.robot.haptics.pressed import Pressed
+from contactfpga.robot.haptics.cover_bias import CoverBias
 from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.surfaces import Cone, CylinderSurface, Mesh, MirroredSurface, PlaneSurface, Surface
@@ -55,7 +55,7 @@ class Plan:
     silent_s: float
     """Time without a frame from which the link is silent."""
     folds: Folds | None = None
-    pressed: Pressed | None = None
+    bias: CoverBias | None = None
     """Places under the Skin's cover; None if it knows no force."""
     trust: bool = False
     """Whether Skin files of the port may name modules."""
@@ -135,16 +135,16 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
         folds=folds,
-        pressed=_pressed(skin, skin_path),
+        bias=_bias(skin, skin_path),
         trust=trusting(),
     )
 
 
-def _pressed(skin: Skin, path: Path) -> Pressed | None:
+def _bias(skin: Skin, path: Path) -> CoverBias | None:
     cover = load_cover(path)
     if cover is None or cover.model == "patch":
         return None
-    return Pressed(cover, 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
+    return CoverBias(cover, 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)
 
 
 def _port(values: dict[str, Any], skin_path: Path) -> str | None:

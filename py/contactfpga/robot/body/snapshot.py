@@ -20,7 +20,7 @@ from contactfpga.robot.body.joints import Joints
 from contactfpga.robot.body.kinematics import Kinematics, Pose
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.state import BodyError, LinkState, NoJoints, NoLinkData
-from contactfpga.robot.haptics.pressed import Pressed
+from contactfpga.robot.haptics.cover_bias import CoverBias
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.batch import Batch
@@ -139,16 +139,16 @@ def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics
         touches.append(haptics.Touch(*plan.place(zone.x_mm, zone.y_mm), plan.friction, 1e-3 * plan.sigma_mm))
     wrench = plan.units.wrench(zones.units.readings)
     found = haptics.contacts(wrench, touches)
-    if plan.pressed is not None:
-        found = haptics.contacts(wrench, [_sharper(plan.pressed, *one) for one in zip(zones, found)])
+    if plan.bias is not None:
+        found = haptics.contacts(wrench, [_sharper(plan.bias, *one) for one in zip(zones, found)])
     ids = {} if tracks is None else {id(track.zone): track.id for track in tracks.active}
     for one, zone in zip(found, zones):
         one.track = ids.get(id(zone))
     return found
 
 
-def _sharper(pressed: Pressed, zone: Zone, found: haptics.Contact) -> haptics.Touch:
-    sigma_m = pressed.sigma_m(zone.area_cells, found.normal_n or 0.0)
+def _sharper(bias: CoverBias, zone: Zone, found: haptics.Contact) -> haptics.Touch:
+    sigma_m = bias.sigma_m(zone.area_cells, found.normal_n or 0.0)
     return found.touch if sigma_m is None else dataclasses.replace(found.touch, point_sigma_m=sigma_m)
 
 

@@ -104,12 +104,12 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
     """The task and all candidates; raises ValueError for impossible requests."""
     from contactfpga_sim.apps.fit import candidates
     from contactfpga_sim.apps.fit.faces import feels
-    from contactfpga_sim.apps.fit.sources import Recorded, default_count, source
+    from contactfpga_sim.apps.fit.sources import RecordingSource, default_count, source
     from contactfpga_sim.apps.fit.trial import FitTask, Goals
 
     base = Skin.load(args.skin) if args.skin else None
     sources = tuple(source(name, args.seed, args.threshold) for name in args.scenes)
-    covers = _covers(args, all(isinstance(one, Recorded) for one in sources))
+    covers = _covers(args, all(isinstance(one, RecordingSource) for one in sources))
     goals = Goals(
         miscounted=_share(args.miscounted),
         missed=_share(args.missed),

@@ -13,7 +13,7 @@ from contactfpga.choices.scans import SCANS
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.apps.fit.faces import BARE, Faces, refusal
-from contactfpga_sim.apps.fit.sources import Recorded, Size, Source
+from contactfpga_sim.apps.fit.sources import RecordingSource, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:
@@ -96,7 +96,7 @@ def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
     two disagree."""
     asked = {one: size for one in sources if (size := one.size_mm())}
     if base is not None:
-        asked = {one: size for one, size in asked.items() if isinstance(one, Recorded)}
+        asked = {one: size for one, size in asked.items() if isinstance(one, RecordingSource)}
     sizes = list(asked.values())
     given = base or Skin()
     size = (given.columns * given.pitch_x_mm, given.rows * given.pitch_y_mm)
@@ -117,7 +117,7 @@ def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[fl
     for pitch in asked or ():
         if not 0 < pitch < math.inf:
             raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")
-    recorded = [one.recording for one in sources if isinstance(one, Recorded)]
+    recorded = [one.recording for one in sources if isinstance(one, RecordingSource)]
     if recorded:
         pitch = recorded[0].pitch_mm or Skin().pitch_x_mm
         if asked and list(asked) != [pitch]:

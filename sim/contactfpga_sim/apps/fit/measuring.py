@@ -14,7 +14,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.apps import errors, result_cache, speed, stats
 from contactfpga_sim.apps.errors import METRICS, Look
 from contactfpga_sim.apps.fit import faces
-from contactfpga_sim.apps.fit.sources import Recorded, Source
+from contactfpga_sim.apps.fit.sources import RecordingSource, Source
 from contactfpga_sim.apps.fit.trial import SHARES, FitTask, Goals
 from contactfpga_sim.apps.speed import Speed
 from contactfpga_sim.apps.stats import Interval, interval
@@ -35,7 +35,7 @@ def errors_of(
     """Errors by metric of each Skin's zones, on one sheet and cover. ``others``: on all scenes reserved for the
     report, else on as many as a decision needs. All frames of a recording count."""
     count = source.most(task.count)
-    ends = [count] if others or isinstance(source, Recorded) else stats.looks(FIRST, count)
+    ends = [count] if others or isinstance(source, RecordingSource) else stats.looks(FIRST, count)
     values: list[Values] = [{} for _ in skins]
     left = list(range(len(skins)))
     for first, last in itertools.pairwise([0, *ends]):

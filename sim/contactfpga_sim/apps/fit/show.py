@@ -12,7 +12,7 @@ from contactfpga.design.cover.press import write_cover
 from contactfpga.tools.console import tables
 from contactfpga_sim.apps.errors import METRICS
 from contactfpga_sim.apps.fit.cost import DEVICE
-from contactfpga_sim.apps.fit.sources import Recorded
+from contactfpga_sim.apps.fit.sources import RecordingSource
 from contactfpga_sim.apps.fit.trial import Fit, Measurement, Trial
 from contactfpga_sim.apps.speed import Speed
 from contactfpga_sim.apps.stats import Interval
@@ -188,7 +188,7 @@ def notes(fit: Fit) -> list[str]:
         )
     elif fit.answer:
         lines.append(f"{len(fit.cheaper)} cheaper ones are refused; {fit.dearer} others cost more.")
-    if any(isinstance(source, Recorded) for source in fit.task.sources):
+    if any(isinstance(source, RecordingSource) for source in fit.task.sources):
         lines.append(
             "Of a recording nobody knows what touched: its errors are against the connected pieces of its pressed "
             "cells, and its frames are no independent scenes, so intervals are too narrow."

@@ -61,7 +61,7 @@ class Source(abc.ABC):
 
 
 @dataclasses.dataclass(frozen=True)
-class Placed(Source):
+class SceneSource(Source):
     @abc.abstractmethod
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
         """A scene, and its sampling instant in s."""
@@ -79,7 +79,7 @@ class Placed(Source):
 
 
 @dataclasses.dataclass(frozen=True)
-class Family(Placed):
+class Family(SceneSource):
     """One of :data:`contactfpga_sim.model.scenes.families.FAMILIES`."""
 
     family: str
@@ -90,7 +90,7 @@ class Family(Placed):
 
 
 @dataclasses.dataclass(frozen=True)
-class BuiltIn(Placed):
+class BuiltIn(SceneSource):
     """One of :data:`contactfpga_sim.model.scenes.scene.CONTACTS`, made for the requested Skin."""
 
     scene: str
@@ -107,7 +107,7 @@ class BuiltIn(Placed):
 
 
 @dataclasses.dataclass(frozen=True)
-class Shifted:
+class Offset:
     value: Value
     by: float
 
@@ -116,11 +116,11 @@ class Shifted:
 
 
 def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
-    return dataclasses.replace(contact, x_mm=Shifted(contact.x_mm, by_x), y_mm=Shifted(contact.y_mm, by_y))
+    return dataclasses.replace(contact, x_mm=Offset(contact.x_mm, by_x), y_mm=Offset(contact.y_mm, by_y))
 
 
 @dataclasses.dataclass(frozen=True)
-class File(Placed):
+class File(SceneSource):
     says: SceneFile
 
     def size_mm(self) -> Size | None:
@@ -132,7 +132,7 @@ class File(Placed):
 
 
 @dataclasses.dataclass(frozen=True)
-class Recorded(Source):
+class RecordingSource(Source):
     """A recording of one sheet's cells; the truth is their connected pieces by the requested Skin's connectivity.
     Choosing scenes are from the first half, report scenes from the second."""
 
@@ -183,7 +183,7 @@ def source(name: str, seed: int | None = None, threshold: float | None = None) -
         return BuiltIn(name, seed or 0)
     if name.endswith((".npz", ".npy")):
         with open_regular(name) as file:
-            found = Recorded(name, hashlib.sha256(file.read()).hexdigest(), threshold)
+            found = RecordingSource(name, hashlib.sha256(file.read()).hexdigest(), threshold)
         if (frames := len(found.recording.pressed)) < 4:
             raise ValueError(f"{name} has {frames} frames; two to choose with and two to report are the least")
         return found

@@ -25,7 +25,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     still,
 )
-from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
+from contactfpga_sim.lab.knobs import Knob, Outcome, RateTest
 from contactfpga_sim.model.sheet import wiring
 from contactfpga_sim.model.sheet.line import lines_of
 from contactfpga_sim.model.sheet.wiring import Wiring, at_rest
@@ -95,7 +95,7 @@ SETTLE = Knob(
     axis="capacitance of a line, pF",
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
-        name: Rated(functools.partial(_capacitance, skin, circuit), most=120)
+        name: RateTest(functools.partial(_capacitance, skin, circuit), most=120)
         for name, skin, circuit in (
             ("4.7 kΩ pull-up, `release_us = 1`", REFERENCE, PULLED),
             ("40 kΩ pull-up, the same", REFERENCE, WEAKLY),
@@ -154,8 +154,8 @@ DIODES = Knob(
     axis="such switches under one of three fingers",
     values=(0, 1, 2, 3, 4),
     runs={
-        "three fingers at corners": Rated(functools.partial(bare, REFERENCE)),
-        "the same with guard lines": Rated(functools.partial(bare, GUARDED)),
+        "three fingers at corners": RateTest(functools.partial(bare, REFERENCE)),
+        "the same with guard lines": RateTest(functools.partial(bare, GUARDED)),
     },
     helps='test each diode before fitting; a board for `diodes = "none"` lets rows float and flags ghosts',
     unnoticed="two row pins drive against each other, and the level between low and high may read either way; the "
@@ -215,7 +215,7 @@ GHOSTS = Knob(
     title="Fingers on a sheet without diodes",
     axis="fingers of 2x2 cells",
     values=tuple(range(1, 9)),
-    runs={"zones": Rated(_scattered), "cells": Rated(_scattered_cells)},
+    runs={"zones": RateTest(_scattered), "cells": RateTest(_scattered_cells)},
     helps="diodes",
     unnoticed="the same switches read pressed as under one larger contact",
 )
@@ -225,7 +225,7 @@ GHOST = Knob(
     title="Three corners fake the fourth, without diodes",
     axis="fingers at the corners of a rectangle",
     values=(1, 2, 3, 4),
-    runs={"zones": Rated(_corners)},
+    runs={"zones": RateTest(_corners)},
     helps="diodes",
 )
 
@@ -244,8 +244,8 @@ SETTLE_REVERSAL = Knob(
     axis="capacitance of a line, pF",
     values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
-        "4.7 kΩ pull-up": Rated(functools.partial(_capacitance, REVERSAL, PULLED), most=120),
-        "the same with guard lines": Rated(functools.partial(_capacitance, REVERSAL_GUARDED, PULLED), most=120),
+        "4.7 kΩ pull-up": RateTest(functools.partial(_capacitance, REVERSAL, PULLED), most=120),
+        "the same with guard lines": RateTest(functools.partial(_capacitance, REVERSAL_GUARDED, PULLED), most=120),
     },
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances",
 )
@@ -256,8 +256,8 @@ PROJECT_REVERSAL = Knob(
     axis="resistance of a pressed switch, kΩ",
     values=(0.1, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 20),
     runs={
-        "rows pulled by 10 kΩ": Rated(functools.partial(_switch, PATIENT), most=120),
-        "the same with guard lines": Rated(functools.partial(_switch, PATIENT_GUARDED), most=120),
+        "rows pulled by 10 kΩ": RateTest(functools.partial(_switch, PATIENT), most=120),
+        "the same with guard lines": RateTest(functools.partial(_switch, PATIENT_GUARDED), most=120),
     },
     helps="switches of less resistance, weaker pulls of the rows; `contactfpga settle` says what a circuit needs",
     unnoticed="a row that is not lifted reads as one that nobody touches; guard lines with such switches report it",
@@ -268,8 +268,8 @@ DIODES_REVERSAL = dataclasses.replace(
     name="diodes_reversal",
     title="Switches without a sound diode, by line reversal",
     runs={
-        "three fingers at corners": Rated(functools.partial(bare, REVERSAL)),
-        "the same with guard lines": Rated(functools.partial(bare, REVERSAL_GUARDED)),
+        "three fingers at corners": RateTest(functools.partial(bare, REVERSAL)),
+        "the same with guard lines": RateTest(functools.partial(bare, REVERSAL_GUARDED)),
     },
 )
 
@@ -293,10 +293,10 @@ BROKEN = Knob(
     axis="broken lines side by side",
     values=(0, 1, 2, 3),
     runs={
-        "row": Rated(functools.partial(_broken, REFERENCE, "row")),
-        "column": Rated(functools.partial(_broken, REFERENCE, "column")),
-        "row, with guard lines": Rated(functools.partial(_broken, GUARDED, "row")),
-        "column, with guard lines": Rated(functools.partial(_broken, GUARDED, "column")),
+        "row": RateTest(functools.partial(_broken, REFERENCE, "row")),
+        "column": RateTest(functools.partial(_broken, REFERENCE, "column")),
+        "row, with guard lines": RateTest(functools.partial(_broken, GUARDED, "row")),
+        "column, with guard lines": RateTest(functools.partial(_broken, GUARDED, "column")),
     },
     helps="guard lines; `contactfpga wire` shows lines that never read pressed",
     unnoticed="what is past a break looks like switches that nobody presses; only one that is closed for good shows "
@@ -308,10 +308,10 @@ BROKEN_REVERSAL = dataclasses.replace(
     name="broken_reversal",
     title="Lines that are broken, by line reversal",
     runs={
-        "row": Rated(functools.partial(_broken, REVERSAL, "row")),
-        "column": Rated(functools.partial(_broken, REVERSAL, "column")),
-        "row, with guard lines": Rated(functools.partial(_broken, REVERSAL_GUARDED, "row")),
-        "column, with guard lines": Rated(functools.partial(_broken, REVERSAL_GUARDED, "column")),
+        "row": RateTest(functools.partial(_broken, REVERSAL, "row")),
+        "column": RateTest(functools.partial(_broken, REVERSAL, "column")),
+        "row, with guard lines": RateTest(functools.partial(_broken, REVERSAL_GUARDED, "row")),
+        "column, with guard lines": RateTest(functools.partial(_broken, REVERSAL_GUARDED, "column")),
     },
 )
 
@@ -360,9 +360,9 @@ STUCK = Knob(
     axis="how many are stuck",
     values=(0, 1, 2, 3, 4, 5, 6),
     runs={
-        "no mask": Rated(functools.partial(_stuck, REFERENCE)),
-        "three in the mask": Rated(functools.partial(_stuck, MASKED)),
-        "columns shorted to the rows' level": Rated(functools.partial(_stuck_columns, REFERENCE)),
+        "no mask": RateTest(functools.partial(_stuck, REFERENCE)),
+        "three in the mask": RateTest(functools.partial(_stuck, MASKED)),
+        "columns shorted to the rows' level": RateTest(functools.partial(_stuck_columns, REFERENCE)),
     },
     helps="`contactfpga doctor --watch` names them in time; list them in `mask`",
     unnoticed="a switch that is stuck and one that is pressed are the same circuit; only time tells them apart",
@@ -373,7 +373,7 @@ STUCK_REVERSAL = dataclasses.replace(
     name="stuck_reversal",
     title="Switches that are stuck closed, by line reversal",
     runs={
-        "no mask": Rated(functools.partial(_stuck, REVERSAL)),
-        "columns shorted to the rows' level": Rated(functools.partial(_stuck_columns, REVERSAL)),
+        "no mask": RateTest(functools.partial(_stuck, REVERSAL)),
+        "columns shorted to the rows' level": RateTest(functools.partial(_stuck_columns, REVERSAL)),
     },
 )

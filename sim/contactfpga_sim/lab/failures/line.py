@@ -18,7 +18,7 @@ from contactfpga.skin.derived import HEARD_BITS
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
-from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
+from contactfpga_sim.lab.knobs import Knob, Outcome, RateTest
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
 OVERSAMPLING = 16
@@ -197,7 +197,7 @@ BAUD = Knob(
     axis="difference, %",
     values=tuple(np.arange(0, 8.01, 0.25).round(2).tolist()),
     runs={
-        f"host {speed}, {what}": Rated(functools.partial(draws, sign), most=480)
+        f"host {speed}, {what}": RateTest(functools.partial(draws, sign), most=480)
         for what, draws in (("frames", _baud), ("requests", _asked))
         for speed, sign in (("faster", 1), ("slower", -1))
     },
@@ -223,7 +223,7 @@ NOISE = Knob(
     title="Pulses on the line",
     axis="pulses per second",
     values=(0, 100, 300, 500, 600, 700, 800, 900, 1_000, 2_000, 5_000, 10_000, 30_000, 100_000, 300_000),
-    runs={"half a bit to two bits long": Rated(_noise)},
+    runs={"half a bit to two bits long": RateTest(_noise)},
     helps="a shorter cable, a slower `baud`",
     # Pulses come at random, and each spoils a frame: the one that it meets, or the next one, to which the byte that it
     # makes is added; a frame comes every 96 us.
@@ -249,7 +249,7 @@ CLOCK = Knob(
     title="A board whose clock is fast",
     axis="its error, %",
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
-    runs={"board with `clock_hz` off": Rated(_clock, most=480)},
+    runs={"board with `clock_hz` off": RateTest(_clock, most=480)},
     helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
     unnoticed="over USB the host knows a frame's instant to a millisecond only, so a small difference shows late",
 )
@@ -366,8 +366,8 @@ SILENCE = Knob(
     axis="ms since its last byte",
     values=(1, 2, 4, 6, 10, 20, 50, 100, 200, 500, 1000, 2000),
     runs={
-        "`latest()`": Rated(functools.partial(_told_late, None)),
-        "`latest(max_age_s=0.005)`": Rated(functools.partial(_told_late, MAX_AGE_S)),
+        "`latest()`": RateTest(functools.partial(_told_late, None)),
+        "`latest(max_age_s=0.005)`": RateTest(functools.partial(_told_late, MAX_AGE_S)),
     },
     helps="`max_age_s`, or `deadline_s` of `subscribe` and `events`; a watchdog at the pin `alive`",
     unnoticed="a read waits for a frame until its timeout; how old one may be, only your program knows",
@@ -378,7 +378,7 @@ HOST = Knob(
     title="A host that reads every now and then",
     axis="ms between reads",
     values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
-    runs={"every frame of `contactfpga.open()`": Rated(_slow_host, most=120)},
+    runs={"every frame of `contactfpga.open()`": RateTest(_slow_host, most=120)},
     helps='`Board.latest()` where only the newest frame counts; `send = "on_change"`',
     # The system's buffer of 4,095 bytes is full of packets of 21 bytes, one per scan.
     closed={"every frame of `contactfpga.open()`": round(TTY_BYTES / (ZONE_BYTES + 4) * SCAN_MS, 1)},

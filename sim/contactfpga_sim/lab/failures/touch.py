@@ -25,7 +25,7 @@ from contactfpga_sim.lab.failures.rig import (
     reported,
     seen,
 )
-from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
+from contactfpga_sim.lab.knobs import Knob, Outcome, RateTest
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Track
 from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
@@ -72,13 +72,13 @@ CLOSING = Knob(
     axis="gap between their rims, mm",
     values=tuple(np.arange(16, -0.25, -0.5).round(2).tolist()),
     runs={
-        f"{connectivity}-connectivity, {pitch} mm": Rated(
+        f"{connectivity}-connectivity, {pitch} mm": RateTest(
             functools.partial(_closing, REFERENCE.replace(connectivity=connectivity), float(pitch))
         )
         for pitch in (10, 5)
         for connectivity in (8, 4)
     }
-    | {f"starter kit, {force} N each": Rated(functools.partial(_closing_covered, force)) for force in (2, 5, 10)},
+    | {f"starter kit, {force} N each": RateTest(functools.partial(_closing_covered, force)) for force in (2, 5, 10)},
     helps="a finer pitch; 4-connectivity; a light touch",
     unnoticed="the same switches are pressed as by one contact of that shape",
     # Wherever the pair lies, a row or column between the fingers is free: by 8-connectivity from sqrt(2) pitches on, by
@@ -107,7 +107,7 @@ LIGHT = Knob(
     title="A finger that presses lightly on the starter kit",
     axis="force, N",
     values=(20, 15, 10, 8, 6, 5, 4, 3.5, 3, 2.5, 2, 1.5, 1.25, 1, 0.75, 0.5),
-    runs={f"{2 * radius} mm": Rated(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
+    runs={f"{2 * radius} mm": RateTest(functools.partial(_light, float(radius))) for radius in (4, 8, 12)},
     helps="switches of less force; `contactfpga cover felt` says from which force on a finger is felt",
     unnoticed="a switch that is pressed too lightly to close is one that nobody touches",
 )
@@ -159,8 +159,8 @@ MOVING = Knob(
     axis="pitches per raster scan",
     values=(0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={
-        "`raster`": Rated(functools.partial(_moving, REFERENCE, None), most=480),
-        "starter kit, 10 N": Rated(functools.partial(_moving, STARTER.skin, COVER), most=480),
+        "`raster`": RateTest(functools.partial(_moving, REFERENCE, None), most=480),
+        "starter kit, 10 N": RateTest(functools.partial(_moving, STARTER.skin, COVER), most=480),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time",
     unnoticed="a zone one pitch from its finger looks like one in its place; only where faster motion tears a frame is "
@@ -206,7 +206,7 @@ BOUNCE = Knob(
     axis="time for which it opens once more, us",
     values=tuple(range(0, 193, 12)),
     runs={
-        f"`{method}`": Rated(functools.partial(_bounce, BOUNCING if method == "none" else debounced(method)))
+        f"`{method}`": RateTest(functools.partial(_bounce, BOUNCING if method == "none" else debounced(method)))
         for method in ("none", "sym_defer_pk", "asym_eager_defer_pk")
     },
     helps="longer debounce times than the switch bounces; nobody can tell a long bounce from a second touch",
@@ -262,7 +262,7 @@ WINDING = Knob(
     title="An arm that winds around a finger",
     axis="quarters of a turn",
     values=tuple(range(12)),
-    runs={f"`{name}`": Rated(functools.partial(_winding, skin)) for name, skin in SKINS.items()},
+    runs={f"`{name}`": RateTest(functools.partial(_winding, skin)) for name, skin in SKINS.items()},
     helps="an exact labeller: `run` or `serial`",
     unnoticed="`projection` and `single` keep the shadows of what is pressed, and both shapes have the same ones",
 )
@@ -281,7 +281,7 @@ CROSSING = Knob(
     title="Two fingers of 24 mm, side by side at any angle",
     axis="distance of their middles, mm",
     values=tuple(range(70, 24, -1)),
-    runs={f"`{name}`": Rated(functools.partial(_crossing, SKINS[name])) for name in ("run", "projection", "single")},
+    runs={f"`{name}`": RateTest(functools.partial(_crossing, SKINS[name])) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
     unnoticed="pressed cells that touch are one zone by definition; `projection` and `single` see shadows only",
     # As for two fingers that close in: 24 mm and sqrt(2) pitches.
@@ -309,6 +309,6 @@ MANY = Knob(
     title=f"More zones than `zone_capacity = {CAPACITY}`",
     axis="zones on the sheet",
     values=(*range(1, 13), 16, 32, 64),
-    runs={"any labeller": Rated(functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY)))},
+    runs={"any labeller": RateTest(functools.partial(_many, REFERENCE.replace(zone_capacity=CAPACITY)))},
     helps='a larger `zone_capacity`; `report = "cells"`',
 )

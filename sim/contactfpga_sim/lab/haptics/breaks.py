@@ -20,7 +20,7 @@ from contactfpga.robot.haptics.rate import hexapod
 from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.lab.haptics import coverage
 from contactfpga_sim.lab.haptics.coverage import PATCH, CoverageCase
-from contactfpga_sim.lab.knobs import LOOKS, Knob, Outcome, Rated
+from contactfpga_sim.lab.knobs import LOOKS, Knob, Outcome, RateTest
 
 HOLDS = 0.9
 """Required share of contacts within the stated interval, below 95 % to allow for chance."""
@@ -170,8 +170,8 @@ def _located(case: CoverageCase, rng: Random, count: int) -> list[Outcome]:
     raise ValueError(f"{TRIES} touches close no switch for one that does: {case}")
 
 
-def _rated(draws: Callable[[float, Random, int], list[Outcome]], most: int = LOOKS[-1]) -> Rated:
-    return Rated(draws, most=most, level=HOLDS, telling=TELLS)
+def _rated(draws: Callable[[float, Random, int], list[Outcome]], most: int = LOOKS[-1]) -> RateTest:
+    return RateTest(draws, most=most, level=HOLDS, telling=TELLS)
 
 
 def _both(change: Callable[[float], Disturbance]) -> dict[str, Callable[[float], Outcome]]:

@@ -79,7 +79,7 @@ class Coverage:
 
 
 @dataclasses.dataclass(frozen=True)
-class Pressed:
+class Press:
     x_m: float
     y_m: float
     push_n: float
@@ -106,7 +106,7 @@ def locator(case: CoverageCase) -> Locator:
 
 def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
     rng, finder = np.random.default_rng(seed), locator(case)
-    find: Callable[[Pressed], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
+    find: Callable[[Press], tuple[Place, float]] = functools.partial(METHODS[case.method], case, finder, rng)
     errors, coarse, radii, theory, agrees = [], [], [], [], []
     for _ in range(count):
         one = press(case, rng)
@@ -127,7 +127,7 @@ def run(case: CoverageCase, count: int, seed: int = 1) -> Coverage:
     )
 
 
-def press(case: CoverageCase, rng: np.random.Generator) -> Pressed:
+def press(case: CoverageCase, rng: np.random.Generator) -> Press:
     """A rising push at a random place of a cell."""
     pitch = 1e-3 * case.pitch_mm
     x, y = (MIDDLE + rng.random(2)) * pitch
@@ -139,7 +139,7 @@ def press(case: CoverageCase, rng: np.random.Generator) -> Pressed:
     push = float(rng.uniform(*case.push_n))
     rows, columns = np.nonzero(closing <= push)
     cells = list(zip(rows.tolist(), columns.tolist()))
-    return Pressed(float(x), float(y), push, cells, [float(closing[cell]) for cell in cells])
+    return Press(float(x), float(y), push, cells, [float(closing[cell]) for cell in cells])
 
 
 def _measured(case: CoverageCase, rng: np.random.Generator, force: float) -> float:
@@ -147,38 +147,38 @@ def _measured(case: CoverageCase, rng: np.random.Generator, force: float) -> flo
     return max(0.01, force + sigma * float(rng.standard_normal()))
 
 
-def _closings(case: CoverageCase, rng: np.random.Generator, one: Pressed) -> list[Closing]:
+def _closings(case: CoverageCase, rng: np.random.Generator, one: Press) -> list[Closing]:
     return [Closing(*cell, _measured(case, rng, force + case.late_n)) for cell, force in zip(one.cells, one.closing_n)]
 
 
-def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_barycenter(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> tuple[Place, float]:
     """Static estimate from the push."""
     rows, columns = np.mean(one.cells, axis=0) * 1e-3 * case.pitch_mm
     return finder.barycenter(float(columns), float(rows), _measured(case, rng, one.push_n)), math.nan
 
 
-def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_set(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> tuple[Place, float]:
     """Static estimate from cells and push."""
     return finder.locate(one.cells, _measured(case, rng, one.push_n)), math.nan
 
 
-def by_closings(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_closings(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> tuple[Place, float]:
     closings = _closings(case, rng, one)
     return finder.locate(one.cells, _measured(case, rng, one.push_n), closings), bound_m(case, one)
 
 
-def by_center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> tuple[Place, float]:
     found = _center(case, finder, rng, one)
     return found, found.radius_m
 
 
-def by_both(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:
+def by_both(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> tuple[Place, float]:
     center = _center(case, finder, rng, one)
     found = finder.locate(one.cells, one.push_n, _closings(case, rng, one), center)
     return found, math.nan
 
 
-def _center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Pressed) -> Place:
+def _center(case: CoverageCase, finder: Locator, rng: np.random.Generator, one: Press) -> Place:
     cells = units()
     x, y = one.x_m - _middle_m(case), one.y_m - _middle_m(case)
     exerted = np.array([0, 0, -one.push_n, -one.push_n * y, one.push_n * x, 0])
@@ -193,7 +193,7 @@ def _middle_m(case: CoverageCase) -> float:
     return 1e-3 * case.pitch_mm * (LINES - 1) / 2
 
 
-def bound_m(case: CoverageCase, one: Pressed) -> float:
+def bound_m(case: CoverageCase, one: Press) -> float:
     """Smallest 95 % radius that noise allows, from the slopes of closing forces over the place (Cramér-Rao); NaN
     with fewer than two closings, or two in line with the contact."""
     reach, pitch = reach_of(case.assumed), 1e-3 * case.pitch_mm
@@ -216,7 +216,7 @@ def _rms(errors: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-METHODS: dict[str, Callable[[CoverageCase, Locator, np.random.Generator, Pressed], tuple[Place, float]]] = {
+METHODS: dict[str, Callable[[CoverageCase, Locator, np.random.Generator, Press], tuple[Place, float]]] = {
     "barycenter": by_barycenter,
     "set": by_set,
     "closings": by_closings,

@@ -30,7 +30,6 @@ from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
-from contactfpga.driver import health
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga_sim.apps.latency import stages
@@ -136,7 +135,7 @@ def _commit() -> str:
 
 def _times(kit: Kit) -> Iterator[Prediction]:
     command = f"contactfpga latency --kit {kit.name} --exact"
-    bridge = BridgeSettings(kit.board.bridge, health.LATENCY_MS, health.EVENT_CHAR & 0xFF)
+    bridge = BridgeSettings(kit.board.bridge)
     found = stages.measure(kit.skin, bridge, host_touches=0)
     board, us = found.board, kit.skin.clock_hz / 1e6
     usb = MixedTimes.mixed(delivered(bridge, kit.skin.clock_hz, one.stream, one.byte) for one in board.recorded)

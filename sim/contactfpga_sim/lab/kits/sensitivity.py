@@ -67,11 +67,8 @@ def headlines(changes: Mapping[str, float], touches: int = TOUCHES, scenes: int 
 
 
 def _peak_n(cover: Cover, body: str, wide: float, latencies: places.Latencies, touches: int) -> float:
-    paper = Case.load("paper")
-    foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
-    foam["radius_m"] = paper.foam.radius_m * wide
-    switch, cap = dataclasses.asdict(cover.switch), dataclasses.asdict(cover)["cap"]
-    case = paper.but(model="foam", body=body, foam=foam, switch=switch, cap=cap)
+    case = Case.load("paper").wearing(cover)
+    case = case.but(body=body, foam={"radius_m": case.foam.radius_m * wide})
     batches = places.batches(case, KIT.skin, (latencies,), touches)
     return float(np.mean([force for batch in batches for force, *_ in places.work(batch)[0]]))
 

@@ -22,7 +22,7 @@ STEP_S, ENDS_S = 1e-3, 0.25
 """MuJoCo's step, and a time by which all arms touched the bar and all but one let go."""
 
 
-class Asked(Pace):
+class SteppedPace(Pace):
     """A pace that runs the robots up to a given moment."""
 
     until_s = 0.0
@@ -31,11 +31,11 @@ class Asked(Pace):
         return self.until_s - at_s
 
 
-def paced(found: SimulatedSource) -> Asked:
+def paced(found: SimulatedSource) -> SteppedPace:
     """All skins side by side, at the requested pace."""
     found.skin = ALL
     found.restart()
-    pace = found.pace = Asked(0.0)
+    pace = found.pace = SteppedPace(0.0)
     return pace
 
 

@@ -16,14 +16,14 @@ from contactfpga_sim.lab.tracking.reflex import example
 PACE = Pace(1_000, 1, 2.0)
 
 
-class Missed(NamedTuple):
+class MissedDeadlines(NamedTuple):
     deadlines: int
     missed: int
     silent: int
     """Stops for lack of a recent frame, though one came every ms."""
 
 
-def measured(reader: str, busy: bool, switch_s: float) -> Missed:
+def measured(reader: str, busy: bool, switch_s: float) -> MissedDeadlines:
     """Run the loop; ``switch_s``: Python's switch interval."""
     loop, usual = example(), sys.getswitchinterval()
     begun: list[float] = []
@@ -48,4 +48,4 @@ def measured(reader: str, busy: bool, switch_s: float) -> Missed:
                 sys.setswitchinterval(usual)
     periods = {int((moment - begun[0]) / loop.PERIOD_S) for moment in begun}
     deadlines = int((begun[-1] - begun[0]) / loop.PERIOD_S) + 1
-    return Missed(deadlines, deadlines - len(periods), silent)
+    return MissedDeadlines(deadlines, deadlines - len(periods), silent)

@@ -14,7 +14,7 @@ import numpy as np
 
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.lab.knobs import Knob, Outcome, Rated
+from contactfpga_sim.lab.knobs import Knob, Outcome, RateTest
 from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Random, zones_of
 from contactfpga_sim.lab.tracking.scores import Nearest, Update, ours
 
@@ -31,13 +31,13 @@ Made = tuple[Zones, ...]
 
 def rated(
     name: str, scene: Callable[[float, Random], Made], right: Callable[[Ids, float], bool], method: Callable[[], Update]
-) -> Rated:
+) -> RateTest:
     """A method over random placements: whether its ids are those of the contacts."""
 
     def draws(value: float, rng: Random, count: int) -> list[Outcome]:
         return [Outcome(right(_ids(method(), scene(value, rng)), value)) for _ in range(count)]
 
-    return Rated(draws, zlib.crc32(name.encode()))
+    return RateTest(draws, zlib.crc32(name.encode()))
 
 
 def _knob(

@@ -108,13 +108,15 @@ class Visitor:
     def _hover(self, place: Callable[[], tuple[float, float]]) -> None:
         """Move the mouse to a place until the page knows; it learns from moves alone, and draws later."""
         until = time.monotonic() + PATIENCE_S
-        while not self.page.evaluate(OVER):
-            if time.monotonic() > until:
-                raise TimeoutError("the page never knew that the mouse is over something to be clicked")
+        while True:
             left, top = self._pixel(place())
             self.page.mouse.move(left + 1, top)
             self.page.mouse.move(left, top)
             self.page.wait_for_timeout(100)
+            if self.page.evaluate(OVER):
+                return
+            if time.monotonic() > until:
+                raise TimeoutError("the page never knew that the mouse is over something to be clicked")
 
     def choose(self, before: str, now: str) -> None:
         """Choose in the panel's list that shows ``before``."""

@@ -23,7 +23,7 @@ NOT_FITTED = (
 )
 
 
-class Graded(NamedTuple):
+class Grade(NamedTuple):
     prediction: Prediction
     measured: float
     within: float
@@ -40,10 +40,10 @@ class Graded(NamedTuple):
         return "as predicted" if self.holds else f"not as predicted: the model of the {self.prediction.model} is wrong"
 
 
-def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float]) -> list[Graded]:
+def graded(predictions: Mapping[str, Prediction], measured: Mapping[str, float]) -> list[Grade]:
     """The measured predictions. A value ``NAME_step`` is the rounding step of NAME."""
     return [
-        Graded(one, measured[name], measured.get(f"{name}_step", 0.0) / 2)
+        Grade(one, measured[name], measured.get(f"{name}_step", 0.0) / 2)
         for name, one in predictions.items()
         if name in measured
     ]
@@ -55,7 +55,7 @@ class BringUpReport:
         self.steps: list[Step] = []
         self.left_out: list[str] = []
         """Omitted steps, with reasons."""
-        self.grades: list[Graded] = []
+        self.grades: list[Grade] = []
         self.not_measured: list[Prediction] = []
         self.fitted: FittedCircuit | None = None
         self.force: FittedForce | None = None

@@ -5,7 +5,7 @@ import pytest
 
 from contactfpga.cover import CoverError
 from contactfpga.design.cover import BODIES, Cap, Cells, Cover, Load, Switch
-from contactfpga.robot.haptics.pressed import RADII_M, Pressed
+from contactfpga.robot.haptics.cover_bias import RADII_M, CoverBias
 
 TILES = Cover("foam", 0.003, Switch(force_n=0.3), cap=Cap(0.0098))
 PITCH = 0.01
@@ -31,14 +31,14 @@ def test_the_spread_is_that_of_random_touches_which_close_as_many(touched, count
     mine = touched[touched[:, 0] == count, 1]
     assert len(mine) > 40
     expected = np.sqrt(mine.mean() / 2)
-    assert Pressed(TILES, PITCH, PITCH).sigma_m(count, 5.0) == pytest.approx(expected, rel=0.15)
+    assert CoverBias(TILES, PITCH, PITCH).sigma_m(count, 5.0) == pytest.approx(expected, rel=0.15)
     assert expected < 0.7 * PITCH / np.sqrt(12)
 
 
 def test_what_no_touch_closes_is_not_known():
-    pressed = Pressed(TILES, PITCH, PITCH)
+    pressed = CoverBias(TILES, PITCH, PITCH)
     assert pressed.sigma_m(40, 5.0) is None
     assert pressed.sigma_m(1, 0.0) is None
     assert pressed.sigma_m(1, 1e-3) is None
     with pytest.raises(CoverError, match="patch"):
-        Pressed(Cover(), PITCH, PITCH)
+        CoverBias(Cover(), PITCH, PITCH)

@@ -24,7 +24,7 @@ STEP = 1.25
 """Ratio of successive pushes in the table."""
 
 
-class Pressed:
+class CoverBias:
     """Barycenters under one cover. Raises :class:`~contactfpga.cover.CoverError` for a cover that knows no force or
     does not fit the pitch."""
 
