@@ -5,17 +5,16 @@ import random
 import re
 
 import pytest
+from random_sheet import drawn, refused
 from sample import sample
 
 pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 
-from traced_board import TracedBoard, lines_of
+from traced_board import TracedBoard, lines_of, written
 
 from contactfpga import Skin
 from contactfpga.boards import BOARDS, wiring
-from contactfpga.design.sheet import files, lay_out
-from contactfpga.design.sheet.caps import caps
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 
@@ -49,12 +48,6 @@ SKINS = {
 }
 QUICK = {"8x8", "16x16 guard", "12x20 registers", "6x5 reversal", "10x9 165", "9x12 closed guard", "masked", "1x1"}
 SLOW = {"24x32 closed"}
-
-
-def written(folder, skin, part="dome"):
-    layout = lay_out(skin, part=part)
-    files.write(folder, layout, caps(skin, layout.switch), "")
-    return layout
 
 
 def wide_board(skin):
@@ -133,7 +126,7 @@ def named_chips(board, skin, wires):
     ways = {"74HC595": ("row_data", skin.row_chains, 14, 9), "74HC165": ("column_data", skin.column_chains, 9, 10)}
     found = {}
     for kind, (port, chains, first, after) in ways.items():
-        names = [name for name in board.parts("U") if board.placed[name][0] == kind]
+        names = [name for name in board.parts("U") if board.values[name] == kind]
         starts = {board.pad(name, first): name for name in names}
         for chain in range(chains if names else 0):
             copper, number = wires[port if chains == 1 else f"{port}[{chain}]"], 0
@@ -164,3 +157,11 @@ def test_copper_is_the_wiring_table(tmp_path, name):
     skin, part = SKINS[name]
     written(tmp_path, skin, part)
     check_against_the_wiring_table(TracedBoard(tmp_path), skin)
+
+
+@pytest.mark.parametrize("seed", sample(range(20), quick=[4], slow=[5, 6]))
+def test_copper_of_random_sheets_is_the_wiring_table(tmp_path, seed):
+    skin, part = drawn(seed)
+    if not refused(skin, part):
+        written(tmp_path, skin, part)
+        check_against_the_wiring_table(TracedBoard(tmp_path), skin)

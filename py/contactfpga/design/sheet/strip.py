@@ -28,6 +28,11 @@ ENABLE_OHM = 10_000
 """Resistor that disables the 74HC595 while the FPGA is configured (docs/boards.md)."""
 
 
+_LABELS = {"U": (0.0, -4.35, False), "C": (0.0, -2.1, False), "R": (0.0, -2.1, False)}
+"""Offsets of the printed references of the strip's chips and their parts; a connector has its name on both sides."""
+_LINE_LABEL = 0.0, -1.5, True
+
+
 @dataclasses.dataclass(frozen=True)
 class Line:
     """A row or column where it leaves the matrix, on the top side."""
@@ -54,7 +59,8 @@ class _Unit:
     nets: dict[str, str]
 
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
-        one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
+        label = _LABELS.get(self.letter)
+        one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn, label=label)
         return [
             Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
         ]
@@ -92,14 +98,14 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
         drawing.via(line.net, x, base)
         drawing.run(line.net, "B", (x, base), (x, middle + 0.8))
     ohms = f"{circuit.series_ohm:g}"
-    drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90)
+    drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90, label=_LINE_LABEL)
     yield _stepped(drawing, line.pin, x, middle - 0.8, grid)
     if line.pull:
         x -= _BESIDE
         drawing.run(line.net, "B", (line.x, middle + 0.8), (x, middle + 0.8))
         ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
         rail = SUPPLY if line.pull == "up" else GND
-        drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90)
+        drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90, label=_LINE_LABEL)
         yield _stepped(drawing, rail, x, middle - 0.8, grid)
 
 

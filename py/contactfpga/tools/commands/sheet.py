@@ -37,7 +37,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns 1 if KiCad was run and found something."""
-    from contactfpga.design.sheet import check, files
+    from contactfpga.design.sheet import check, files, houses
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted
 
@@ -53,10 +53,14 @@ def run(args: argparse.Namespace) -> int:
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
+    by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
+    large = "" if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
     answer: dict[str, Any] = {
         "folder": str(folder),
         "files": names,
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
+        "note": large,
+        "by_hand": collections.Counter(by_hand),
         "parts": collections.Counter(one.part.name for one in layout.drawing.placed),
         "caps": {
             "count": len(layer.centers),
@@ -83,7 +87,11 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
         f"{VIA_MM}/{VIA_DRILL_MM} mm",
         hang=2,
     )
+    if answer["note"]:
+        terminal.say(f"note: {answer['note']}", hang=2)
     terminal.say("parts: " + ", ".join(f"{count} {name}" for name, count in answer["parts"].items()), hang=2)
+    for words, count in answer["by_hand"].items():
+        terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
     cap = answer["caps"]
     terminal.say(
         f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
