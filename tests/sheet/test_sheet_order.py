@@ -1,5 +1,6 @@
 """What board houses and assemblers are sent is within their rules, read from the files by another library."""
 
+import collections
 import csv
 import math
 import re
@@ -18,11 +19,9 @@ from traced_board import PIXEL_MM, TracedBoard, drawn_layer, written
 
 from contactfpga import Skin
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet import houses, orders
+from contactfpga.design.sheet import houses, lay_out, orders
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
-
-TURNED = {"U": (90, 7 * 1.27), "J": (90, None), "D": (0, 2.2), "R": (0, 1.6), "C": (0, 1.6), "SW": (0, None)}
 
 
 def widths(path):
@@ -59,13 +58,11 @@ def check_placement(board):
     assert set(placed) == set(board.values)
     for name, row in placed.items():
         assert (float(row["Mid X"]), float(row["Mid Y"])) == pytest.approx(board.middle(name), abs=2e-3), name
-        letter = name.rstrip("0123456789")
-        last = {"U": "8", "J": "3", "SW": "2"}.get(letter, "2")
-        (x1, y1), (x2, y2) = board.places[name, "1"], board.places[name, last]
-        library = math.radians({"U": -90, "J": -90}.get(letter, 0))  # down, or to the right, y up
-        mirrored = -library if row["Layer"] == "Bottom" else library
-        wanted = mirrored + math.radians(float(row["Rotation"]))
-        if letter != "SW":
+        # from pin 1 to this one the library goes right (0 degrees), or down
+        other, library = {"U": ("8", -90), "J": ("3", -90)}.get(name.rstrip("0123456789"), ("2", 0))
+        (x1, y1), (x2, y2) = board.places[name, "1"], board.places[name, other]
+        wanted = math.radians((-library if row["Layer"] == "Bottom" else library) + float(row["Rotation"]))
+        if not name.startswith("SW"):
             assert math.cos(math.atan2(y2 - y1, x2 - x1) - wanted) == pytest.approx(1, abs=1e-6), name
 
 
@@ -86,20 +83,21 @@ def test_files_are_within_the_rules_of_two_houses(tmp_path, seed):
     assert all(GerberFile.open(path).objects for path in tmp_path.glob("sheet-*.g*"))
 
 
-def test_a_list_of_parts_has_numbers_that_a_maker_has_and_no_row_is_too_long():
-    from contactfpga.design.sheet import lay_out
-
+def test_the_list_of_parts_counts_what_is_soldered_and_has_numbers_that_makers_have():
     odd = Circuit(series_ohm=41.0, column_pull_ohm=47_000.0)
-    layout = lay_out(Skin(rows=16, columns=16, row_drive="74hc595", column_read="74hc165"), odd)
-    rows = list(csv.DictReader(orders.parts_list(layout).splitlines()))
-    numbers = {row["Comment"]: row["Manufacturer Part Number"] for row in rows}
-    assert numbers["47000"] == "RC0603FR-0747KL"
-    assert numbers["10000"] == "RC0603FR-0710KL"
-    assert numbers["41"] == ""  # no such resistor in the series
-    assert (numbers["BAT54WS"], numbers["74HC165"]) == ("BAT54WS-E3-08", "SN74HC165DR")
-    assert not any("DOME" in row["Comment"] for row in rows)
-    assert max(int(row["Quantity"]) for row in rows) <= 200
-    assert all(len(row["Designator"].split(",")) == int(row["Quantity"]) for row in rows)
+    skin = Skin(rows=12, columns=20, row_drive="74hc595", column_read="74hc165", guard=True)
+    rows = list(csv.DictReader(orders.parts_list(lay_out(skin, odd)).splitlines()))
+    assert all(len(row["Designator"].split(",")) == int(row["Quantity"]) <= 200 for row in rows)
+    found = collections.Counter()
+    for row in rows:
+        found[row["Comment"], row["Manufacturer Part Number"]] += int(row["Quantity"])
+    assert found["BAT54WS", "BAT54WS-E3-08"] == 12 * 20 + 12 + 20
+    assert found["74HC595", "SN74HC595DR"] == math.ceil(13 / 8)
+    assert found["74HC165", "SN74HC165DR"] == math.ceil(21 / 8)
+    assert found["41", ""] == 13 + 21  # the maker has no such resistor
+    assert found["47000", "RC0603FR-0747KL"] == 21
+    assert found["10000", "RC0603FR-0710KL"] == 1
+    assert not any("DOME" in value for value, _ in found)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """What a sheet's files say is joined: Gerbers and drill read by gerbonara, drawn as images, and their copper labeled.
 
-The reading shares no code with the layout. Which pad lies where comes from the file for the board's electrical test, read by
-gerbonara as well; what is joined comes from the copper alone.
+The reading shares no code with the layout. Which pad lies where comes from the file for the board's electrical test,
+read by gerbonara as well; what is joined comes from the copper alone.
 """
 
 import csv

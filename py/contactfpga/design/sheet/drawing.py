@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import re
 from typing import Literal
 
 from contactfpga.design.sheet.parts import Pad, Part
@@ -182,15 +183,16 @@ def width_mm(words: str, height: float = TEXT_MM) -> float:
     return height * (LETTER_MM * len(words) - LETTER_MM + 0.5)
 
 
-_GLYPHS = dict(
-    glyph.split(":", 1)
-    for glyph in (
+_GLYPHS = {
+    glyph[0]: glyph[2:]
+    for glyph in re.findall(
+        r"\S+",
         "A:0401102124/0222 B:0400102112/0212231404 C:211001031423 D:00041423211000 E:20000424/0212 F:200004/0212 "
         "G:2110010314232212 H:0004/2024/0222 I:0020/1014/0424 J:20231403 K:0004/200224 L:000424 M:0400122024 "
         "N:04002420 O:10010314232110 P:040010211202 Q:10010314232110/1324 R:040010211202/1224 S:21100112231403 "
         "T:0020/1014 U:0003142320 V:001420 W:0004122420 X:0024/2004 Y:001220/1214 Z:00200424 0:10010314232110/0321 "
         "1:011014/0424 2:0110210424 3:002012231403 4:14100323 5:20000212231403 6:2110010314231202 7:002014 "
-        "8:100112231403122110 9:0314232110011222 -:0222 +:0222/1113 _:0424 .:1314 /:0420"
-    ).split(" ")
-)
+        "8:100112231403122110 9:0314232110011222 -:0222 +:0222/1113 _:0424 .:1314 /:0420",
+    )
+}
 """Strokes of each printed character, joined by "/": points of a grid 2 wide and 4 high, x and y of each in a digit."""

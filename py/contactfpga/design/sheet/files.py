@@ -9,6 +9,7 @@ import tomllib
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import gerber, kicad, orders, picture
@@ -68,8 +69,12 @@ def circuit_table(circuit: Circuit) -> str:
     return "\n".join(lines) + "\n"
 
 
-def completed(text: str, circuit: Circuit) -> str:
-    """A Skin's file with its circuit replaced. Raises :class:`SheetError` if ``circuit`` is no table with a header."""
+def completed(text: str, circuit: Circuit, times_us: Mapping[str, float] = MappingProxyType({})) -> str:
+    """A Skin's file with its circuit and these times replaced. Raises :class:`SheetError` if ``circuit`` is no table
+    with a header, or a time is not on a line of its own."""
+    for name, us in times_us.items():
+        text, count = re.subn(rf"^(\s*{name}\s*=\s*)[\d.eE_+-]+", rf"\g<1>{us:g}", text, flags=re.MULTILINE)
+        text = text if count else f"{name} = {us:g}\n{text}"
     kept, inside = [], False
     for line in text.splitlines():
         if re.match(r"\s*\[", line):
@@ -83,8 +88,10 @@ def completed(text: str, circuit: Circuit) -> str:
         whole = {}
     before = tomllib.loads(text)
     before.pop("circuit", None)
-    if {name: value for name, value in whole.items() if name != "circuit"} != before:
+    whole.pop("circuit", None)
+    if whole != before or any(whole[name] != us for name, us in times_us.items()):
         raise SheetError(
-            "the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit]"
+            "the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit], and "
+            "times on lines of their own"
         )
     return found

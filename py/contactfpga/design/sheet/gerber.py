@@ -1,7 +1,7 @@
 """A layout for a board house: Gerber layers, drill files, and the netlist for its electrical test.
 
-The formats are Gerber X2 (Ucamco, 2021), Excellon in millimeters, and IPC-D-356A; y points up, and (0, 0) is the board's
-lower left corner. The names are those that KiCad gives with Protel's extensions, which board houses recognize.
+The formats are Gerber X2 (Ucamco, 2021), Excellon in millimeters, and IPC-D-356A; y points up, and (0, 0) is the
+board's lower left corner. The names are those that KiCad gives with Protel's extensions, which board houses recognize.
 """
 
 from __future__ import annotations

@@ -105,10 +105,14 @@ def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:
 
 def _check(skin: Skin, switch: SwitchPart) -> None:
     for name, pitch, limit in _too_fine(skin, switch):
-        others = "".join(f", or the part {part}" for part, other in SWITCHES.items() if not _too_fine(skin, other))
+        steps = [f"set {name} = {limit:.4g} or more"]
+        for part, other in SWITCHES.items():
+            still = {axis: finest for axis, _, finest in _too_fine(skin, other)}
+            if still.get(name, 0.0) < limit:
+                steps.append(f"take --part {part}" + "".join(f" and {axis} = {mm:.4g}" for axis, mm in still.items()))
         raise SheetError(
-            f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
-            f"choose a larger pitch{others}"
+            f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm: "
+            f"{', or '.join(steps)}"
         )
 
 

@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 
-
 MASK_MM = 0.05
 """Growth of a solder mask opening over its pad on each side."""
 _E24 = (10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91)
@@ -184,9 +183,7 @@ DIODE = Part(
     marks=((-1.8, -0.5, -1.8, 0.5),),
     article=("Vishay", "BAT54WS-E3-08"),
 )
-RESISTOR = Part(
-    "R_0603", "resistor, 0603, 1 %", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "RC0603FR-07{}L")
-)
+RESISTOR = Part("R_0603", "resistor, 0603, 1 %", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "RC0603FR-07{}L"))
 CAPACITOR = Part(
     "C_0603", "capacitor, 0603, X7R, 50 V", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "CC0603KRX7R9BB104")
 )

@@ -6,7 +6,16 @@ import collections
 from collections.abc import Iterable, Iterator, Sequence
 
 from contactfpga import picture_style
-from contactfpga.design.sheet.drawing import PRINT_MM, VIA_DRILL_MM, VIA_MM, CopperTrack, Drawing, Layer, PlacedPart, Stroke
+from contactfpga.design.sheet.drawing import (
+    PRINT_MM,
+    VIA_DRILL_MM,
+    VIA_MM,
+    CopperTrack,
+    Drawing,
+    Layer,
+    PlacedPart,
+    Stroke,
+)
 from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
@@ -33,7 +42,7 @@ def _lines(drawing: Drawing, title: str) -> Iterator[str]:
         yield from _copper(drawing, layer, color)
     bodies = "".join(map(_body_of, drawing.placed))
     yield f'<path stroke="{_BODY}" stroke-width="0.1" d="{bodies}"/>'
-    yield f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path([one for one in drawing.strokes if one.layer == "F"])}"/>'
+    yield _printed(drawing, "F")
     yield from _dots(_holes(drawing), _HOLE)
     yield "</g>"
     yield from _legend(left, bottom + 1.7 * edge, edge)
@@ -51,14 +60,13 @@ def assembly(drawing: Drawing, title: str) -> str:
         f'{bottom - top + 5 * edge:.2f}">',
         f"<title>{title}, back</title>",
         f'<path fill="#fff" d="{_box(0, 0, right - left + 2 * edge, bottom - top + 5 * edge)}"/>',
-        f'<g transform="translate({right + edge:.3f} {edge - top:.3f}) scale(-1 1)" fill="none" stroke-linecap="round">',
-        f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" '
-        f'd="{_box(left, top, right - left, bottom - top)}"/>',
+        f'<g transform="translate({right + edge:.3f} {edge - top:.3f}) scale(-1 1)" fill="none" '
+        'stroke-linecap="round">',
+        f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>',
         *_pads(back),
         f'<path stroke="{_BODY}" stroke-width="0.15" d="{"".join(_body_of(one) for one in back)}"/>',
         *_dots([(hole.drill, hole.x, hole.y) for hole in drawing.holes], _HOLE),
-        f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" '
-        f'd="{_path([one for one in drawing.strokes if one.layer == "B"])}"/>',
+        _printed(drawing, "B"),
         "</g>",
         *_assembly_legend(edge, bottom - top + 3 * edge, edge, back),
         "</svg>",
@@ -129,6 +137,11 @@ def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
         words.append(f"L{line.x2:.2f} {line.y2:.2f}")
         last = line.x2, line.y2
     return "".join(words)
+
+
+def _printed(drawing: Drawing, layer: Layer) -> str:
+    strokes = [one for one in drawing.strokes if one.layer == layer]
+    return f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(strokes)}"/>'
 
 
 def _box(x: float, y: float, w: float, h: float) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 from contactfpga import terminal
 from contactfpga.design import kits
-from contactfpga.design.circuit import load_checked
+from contactfpga.design.circuit import Circuit, load_checked, needed_by, recommended_us
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawing import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
@@ -49,7 +49,11 @@ def run(args: argparse.Namespace) -> int:
     layout = lay_out(skin, circuit, args.part, args.edge_mm)
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
-    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit)
+    times = _times(skin, found.circuit)
+    longer = {name: us for name, us in times.items() if us is not None}
+    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit, longer)
+    if args.kicad:
+        check.require()
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
@@ -72,11 +76,20 @@ def run(args: argparse.Namespace) -> int:
         "circuit": {
             name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
         },
+        "times": {name: {"given": getattr(skin, name), "needed": us} for name, us in times.items()},
         "extracted": {name: value for name, value in dataclasses.asdict(found).items() if name != "circuit"},
         "kicad": problems,
     }
     results.show(args, answer, lambda: _show(answer, skin))
     return 1 if problems else 0
+
+
+def _times(skin: Skin, circuit: Circuit) -> dict[str, float | None]:
+    """Times of the Skin that are too short for the sheet's circuit, with what it needs; None if no time suffices."""
+    if skin.diodes == "none":
+        return {}  # not in the model
+    wanted = recommended_us(skin, needed_by(skin, circuit))
+    return {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
 
 
 def _show(answer: dict[str, Any], skin: Skin) -> None:
@@ -112,6 +125,10 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     )
     for name, value in answer["circuit"].items():
         terminal.say(f"  {name} = {value:g}")
+    for name, one in answer["times"].items():
+        never = "no time is enough for this circuit, and the next command says why"
+        words = never if one["needed"] is None else f"this circuit needs {one['needed']:g}, and skin.toml has it"
+        terminal.say(f"{name} was {one['given']:g}; {words}", hang=2)
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )
