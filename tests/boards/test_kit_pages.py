@@ -14,11 +14,10 @@ import pytest
 from scipy import ndimage
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import load_circuit, needed
+from contactfpga.design.circuit import needed
 from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import KitError
 from contactfpga.design.predictions import Prediction
-from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
 from contactfpga_sim.lab.arm import kits as kits_arm
@@ -49,7 +48,7 @@ def test_predictions_are_what_is_computed_today(name):
     """The cheap ones, each by other means than the file's: circuit by its model, times by a part of the touches."""
     kit = kits.kit(name)
     found = predictions.load(kit)
-    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    circuit = extracted(kit.layout).circuit
     needs = needed(circuit, kit.skin.row_lines, kit.skin.column_lines)
     assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
     assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
@@ -176,7 +175,7 @@ def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monke
 def test_the_tutorial_lists_the_parts_of_the_starter_kit():
     page = Path("docs/starter.md").read_text(encoding="utf-8")
     kit = kits.kit("starter")
-    placed = lay_out(kit.skin, load_circuit(kit.skin_path)).drawing.placed
+    placed = kit.layout.drawing.placed
     counted = Counter((one.part.order.split(",")[0], one.value) for one in placed)
     wanted = sorted((count, float(value) if value.isdigit() else 0.0) for (_, value), count in counted.items())
     rows = re.findall(r"^\| (\d+) \| [^|]* \| (?:(\d+) (k?)Ω )?\|$", page, re.MULTILINE)

@@ -81,12 +81,12 @@ def test_without_kicad_a_sheet_to_be_checked_is_refused_before_anything_is_writt
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("times", ["", "release_us = 0.9  # mine\nsettle_us = 0.1\n"])
+@pytest.mark.parametrize("times", ["", "release_us = 0.9  # mine\n"])
 def test_the_file_has_the_times_that_its_own_circuit_needs(tmp_path, skin, capsys, times):
     skin.write_text(times + skin.read_text(encoding="utf-8-sig"))
     cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--json"])
     answer = json.loads(capsys.readouterr().out)
-    assert set(answer["times"]) == ({"release_us", "settle_us"} if times else {"release_us"})
+    assert set(answer["times"]) == {"release_us"}
     assert answer["times"]["release_us"]["given"] == Skin.load(skin).release_us
     assert cli.main(["settle", "--skin", str(tmp_path / "out" / "skin.toml")]) == 0
     assert "mine" not in times or "# mine" in (tmp_path / "out" / "skin.toml").read_text()

@@ -12,6 +12,7 @@ import math
 
 from contactfpga import __version__
 from contactfpga.boards import wiring
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import strip
 from contactfpga.design.sheet.drawing import (
@@ -68,8 +69,15 @@ _PRINT_GAP = 0.25
 """From a pad to print: the mask's opening grows by 0.05 mm, and houses want 0.15 mm beside it."""
 
 
-def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
-    """Lay out the sheet of a Skin with the switch ``part``. Raises :class:`SheetError` for cells finer than their parts
+def lay_out(
+    skin: Skin,
+    circuit: Circuit | None = None,
+    part: str = "dome",
+    margin_mm: float = MARGIN_MM,
+    board: BoardSpec | None = None,
+) -> Layout:
+    """Lay out the sheet of a Skin with the switch ``part``; with a ``board`` whose wires are all at PMOD sockets, its
+    headers have their order. Raises :class:`SheetError` for cells finer than their parts
     and for lines without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
@@ -78,7 +86,7 @@ def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", marg
     drawing = Drawing()
     base = -skin.pitch_y_mm / 2 - 0.4
     matrix.draw(drawing, base)
-    left, top, right = strip.draw(drawing, skin, fitted, lines, base)
+    left, top, right = strip.draw(drawing, skin, fitted, lines, base, board)
     _outline(drawing, skin, (left, top, right), margin_mm)
     _fiducials(drawing)
     _print(drawing, skin, switch)
@@ -307,7 +315,8 @@ def _print(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
     for row in range(skin.rows) if x is not None else ():
         drawing.text(str(row), x, row * skin.pitch_y_mm + width_mm(str(row)) / 2, upward=True)
     for one in (one for one in drawing.placed if one.reference.startswith("J")):
-        drawing.text(one.reference, one.x, one.y - one.part.height / 2 - 1.0, "B", height=1.5)
+        socket = "" if one.value == one.part.name else one.value
+        drawing.text(f"{one.reference} {socket}".rstrip(), one.x, one.y - one.part.height / 2 - 1.0, "B", height=1.5)
         drawing.text(one.reference, one.x - one.part.width / 2 + 2.2, one.y, height=1.5)
         for pad in one.part.pads:
             _pin_name(drawing, one, pad)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from contactfpga.boards import spec, wiring
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import channel
 from contactfpga.design.sheet.channel import GRID_MM, Grid, Pin
@@ -71,14 +72,17 @@ def port(name: str, bit: int, bits: int) -> str:
     return name if bits == 1 else f"{name}[{bit}]"
 
 
-def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], base: float) -> tuple[float, ...]:
-    """Draw the strip above ``base``; returns its left, top and right end in mm."""
+def draw(
+    drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], base: float, board: BoardSpec | None
+) -> tuple[float, ...]:
+    """Draw the strip above ``base``, with connectors for a board's PMOD sockets if it has all wires there; returns its
+    left, top and right end in mm."""
     grid = Grid(max(line.x for line in lines))  # so that nothing steps nearer to the edge than the last line
     below = [pin for line in lines for pin in _line(drawing, circuit, line, base, grid)]
     bottom = base - 4.6
     middle = (min(line.x for line in lines) + max(line.x for line in lines)) / 2
     chips = _chips(skin, middle, grid)
-    plugs = _connectors(skin, middle, grid, below=bool(chips))
+    plugs = _connectors(_for_pmods(skin, board) or _of_lines(skin), middle, grid, below=bool(chips))
     ends = [pin.x - VIA_MM / 2 for pin in below] + [max(line.x for line in lines) + _PAD]
     if chips:
         below, bottom, passed = _registers(drawing, chips, plugs, below, bottom)
@@ -133,7 +137,23 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
             yield Pin(pin.net, pin.x + GRID_MM, y)
 
 
-def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
+_PMOD_RAILS = {"5": GND, "11": GND, "6": SUPPLY, "12": SUPPLY}
+"""Pins of Digilent's PMOD interface beside its signals."""
+
+
+def _for_pmods(skin: Skin, board: BoardSpec | None) -> dict[str, list[str]]:
+    """Nets of a header for each PMOD socket, so that straight flat cables join both, and of one for the outputs."""
+    found = {}
+    for connector, wires in (board.pmods(skin) if board else {}).items():
+        nets = wires | _PMOD_RAILS
+        # a flat cable alternates between the rows of a header: pins 1 to 6 of the socket, and 7 to 12
+        found[board.connectors[connector]] = [nets.get(str(k // 2 + 1 + k % 2 * 6), "") for k in range(12)]
+    if found:
+        found["OUTPUT"] = ["contact", GND, "alive" if skin.alive else "", GND, SUPPLY, GND]
+    return found
+
+
+def _of_lines(skin: Skin) -> dict[str, list[str]]:
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -141,14 +161,18 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
         count = -(-len(ports) // most)
         share = -(-len(ports) // count)
         found += [_with_grounds(ports[first : first + share]) for first in range(0, len(ports), share)]
-    parts = [header(len(nets)) for nets in found]
+    return {f"{index}": nets for index, nets in enumerate(found)}
+
+
+def _connectors(found: Mapping[str, list[str]], middle: float, grid: Grid, below: bool) -> list[_Unit]:
+    parts = [header(len(nets)) for nets in found.values()]
     left = middle - sum(part.width + GRID_MM for part in parts) / 2
     units = []
-    for part, nets in zip(parts, found, strict=True):
+    for part, (name, nets) in zip(parts, found.items(), strict=True):
         x = grid.near(left + part.width / 2, below)
         left += part.width + GRID_MM
-        named = {str(pin + 1): net for pin, net in enumerate(nets)}
-        units.append(_Unit("J", part, part.name, x, 180, named))
+        named = {str(pin + 1): net for pin, net in enumerate(nets) if net}
+        units.append(_Unit("J", part, part.name if name.isdigit() else name, x, 180, named))
     return units
 
 

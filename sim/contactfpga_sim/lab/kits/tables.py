@@ -11,10 +11,8 @@ from typing import NamedTuple
 
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
-from contactfpga.design.sheet import lay_out
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, pnr_report
 from contactfpga_sim.apps import covers, pool
@@ -184,8 +182,7 @@ def parts_table() -> writer.Table:
     rows = []
     for name in NAMES:
         kit = kits.kit(name)
-        layout = lay_out(kit.skin, load_circuit(kit.skin_path))
-        counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
+        counted = collections.Counter((one.part.order, one.value) for one in kit.layout.drawing.placed)
         for (order, value), count in counted.items():
             shown = ohms(float(value)) if value.isdigit() else ""
             rows.append((name, "sheet", str(count), order, shown))
