@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
         "note": large,
         "by_hand": collections.Counter(by_hand),
-        "parts": collections.Counter(one.part.name for one in layout.drawing.placed),
+        "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
         "caps": {
             "count": len(layer.centers),
             "side_mm": round(layer.side_mm, 6),

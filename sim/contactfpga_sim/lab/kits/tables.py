@@ -182,9 +182,13 @@ def parts_table() -> writer.Table:
     rows = []
     for name in NAMES:
         kit = kits.kit(name)
-        counted = collections.Counter((one.part.order, one.value) for one in kit.layout.drawing.placed)
-        for (order, value), count in counted.items():
-            shown = ohms(float(value)) if value.isdigit() else ""
+        counted: collections.Counter[tuple[str, ...]] = collections.Counter()
+        for one in kit.layout.drawing.placed:
+            if one.value:  # a fiducial is copper
+                ohm = ohms(float(one.value)) if one.value.isdigit() else ""
+                article = " ".join(filter(None, (one.part.article[0], one.part.number(one.value))))
+                counted[one.part.order, ", ".join(filter(None, (ohm, article)))] += 1
+        for (order, shown), count in counted.items():
             rows.append((name, "sheet", str(count), order, shown))
         for other in kit.parts:
             maker = " ".join(filter(None, (other.maker, other.number)))
