@@ -24,7 +24,7 @@ EDGE_LINE_MM = 0.1
 
 def files(drawing: Drawing, name: str) -> dict[str, str]:
     """The text of each file by name; a side without paste has no paste file, as its file would be an empty stencil."""
-    found = {}
+    found: dict[str, str] = {}
     sides: tuple[tuple[Layer, str, str, str], ...] = ("F", "t", "L1", "Top"), ("B", "b", "L2", "Bot")
     for layer, end, number, side in sides:
         plots = {

@@ -312,8 +312,9 @@ def _print(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
     for column in range(skin.columns):
         drawing.text(str(column), column * skin.pitch_x_mm + 1.2, -skin.pitch_y_mm / 2 - 1.4)
     x = _beside(skin, switch)
-    for row in range(skin.rows) if x is not None else ():
-        drawing.text(str(row), x, row * skin.pitch_y_mm + width_mm(str(row)) / 2, upward=True)
+    if x is not None:
+        for row in range(skin.rows):
+            drawing.text(str(row), x, row * skin.pitch_y_mm + width_mm(str(row)) / 2, upward=True)
     for one in (one for one in drawing.placed if one.reference.startswith("J")):
         socket = "" if one.value == one.part.name else one.value
         drawing.text(f"{one.reference} {socket}".rstrip(), one.x, one.y - one.part.height / 2 - 1.0, "B", height=1.5)

@@ -143,8 +143,10 @@ _PMOD_RAILS = {"5": GND, "11": GND, "6": SUPPLY, "12": SUPPLY}
 
 def _for_pmods(skin: Skin, board: BoardSpec | None) -> dict[str, list[str]]:
     """Nets of a header for each PMOD socket, so that straight flat cables join both, and of one for the outputs."""
-    found = {}
-    for connector, wires in (board.pmods(skin) if board else {}).items():
+    found: dict[str, list[str]] = {}
+    if board is None:
+        return found
+    for connector, wires in board.pmods(skin).items():
         nets = wires | _PMOD_RAILS
         # a flat cable alternates between the rows of a header: pins 1 to 6 of the socket, and 7 to 12
         found[board.connectors[connector]] = [nets.get(str(k // 2 + 1 + k % 2 * 6), "") for k in range(12)]
