@@ -116,7 +116,6 @@ CALLS = {
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 def test_an_odd_number_gives_an_answer_or_one_sentence(call):
-    pytest.importorskip("clarabel")
     function, *usual = call
     said = []
     for place, value in itertools.product(range(len(usual)), ODD):

@@ -2,13 +2,7 @@
 
 import numpy as np
 import pytest
-from bumpers import (
-    exerted,
-    in_cone,
-    on_cylinder,
-    random_bumper,
-    wrench,
-)
+from bumpers import exerted, in_cone, on_cylinder, random_bumper, wrench
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -98,6 +98,81 @@ def scattered(rng, count):
             return points, normals
 
 
+def placed(rng, count, kind):
+    """Places with their normals: "scattered" over a cylinder, in a "line", "near" to each other down to 1 um, with
+    "parallel" or "opposed" normals, or "stacked" along their common normal."""
+    points, normals = scattered(rng, count)
+    if kind in ("line", "near", "stacked"):
+        way = {"line": direction(rng), "near": rng.standard_normal((count, 3)), "stacked": normals[0]}[kind]
+        away = (np.arange(count) + rng.uniform(0, 0.5, count)) * 10 ** rng.uniform(-6, -1.5)
+        points = points[0] + away[:, None] * way
+    if kind in ("parallel", "opposed", "stacked"):
+        normals = normals[0] * np.where((rng.random(count) < 0.5) & (kind == "opposed"), -1, 1)[:, None]
+    return points, normals
+
+
 def solved(points, normals, loaded, friction=0.5, **how):
-    """The contacts at these places."""
-    return contacts(loaded, [touch(*pair, friction) for pair in zip(points, normals)], **how)
+    """The contacts at these places, with one friction or with one each."""
+    each = zip(points, normals, np.broadcast_to(friction, len(points)).tolist())
+    return contacts(loaded, [touch(*one) for one in each], **how)
+
+
+def clarabel_cones(points, normals, friction):
+    """(6, 3k) matrix from forces to the wrench, k times (3k,) pushes, and Clarabel's cones of friction (one, or one
+    each; None: of any) with their rows."""
+    import clarabel
+
+    count = len(points)
+    matrix = np.hstack([np.vstack([np.eye(3), np.cross(p, np.eye(3)).T]) for p in points])
+    pushes = [-np.ravel(np.eye(count)[at][:, None] * normals) for at in range(count)]
+    rows, cones = [], []
+    for normal, push, at, mu in zip(normals, pushes, np.eye(count), np.broadcast_to(friction, count)):
+        sides = np.kron(at, np.eye(3) - np.outer(normal, normal))
+        rows += [push[None] * (mu or 1), *([] if mu is None else [sides])]
+        pushing = [clarabel.NonnegativeConeT(1), *([] if mu is None else [clarabel.ZeroConeT(3)])]
+        cones += [clarabel.SecondOrderConeT(4)] if mu else pushing
+    return matrix, pushes, rows, cones
+
+
+def clarabel_least(square, slope, rows, start, cones):
+    """Clarabel's solution with the least x square x / 2 + slope x, of those with rows x + start in the cones."""
+    import clarabel
+    from scipy import sparse
+
+    settings, sides = clarabel.DefaultSettings(), sparse.csc_matrix(-np.vstack(rows))
+    settings.verbose, settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = False, 1e-10, 1e-10, 1e-10
+    square = sparse.csc_matrix(np.triu(square))
+    return clarabel.DefaultSolver(square, slope, sides, np.array(start), cones, settings).solve()
+
+
+def programmed(points, normals, loaded, friction, chi2=3.841458820694124):
+    """Least and largest push of each contact by Clarabel, None where there is no largest one: of forces in friction's
+    cones (None: of any friction) whose misfit exceeds its least by ``chi2``, or is 0 without noise."""
+    import clarabel
+
+    matrix, pushes, rows, cones = clarabel_cones(points, normals, friction)
+    six, start, none = loaded.array, [0.0] * sum(map(len, rows)), np.zeros((3 * len(points),) * 2)
+    if loaded.noise is None:
+        rows, start, cones = [*rows, -matrix], [*start, *six], [*cones, clarabel.ZeroConeT(6)]
+    else:
+        weigh = np.linalg.inv(np.linalg.cholesky(loaded.noise.covariance))
+        matrix, six = weigh @ matrix, weigh @ six
+        best = matrix @ clarabel_least(matrix.T @ matrix, -six @ matrix, rows, start, cones).x - six
+        rows, cones = [*rows, 0 * pushes[0][None], -matrix], [*cones, clarabel.SecondOrderConeT(7)]
+        start = [*start, np.sqrt(best @ best + chi2), *six]
+    found = [clarabel_least(none, sign * push, rows, start, cones) for push in pushes for sign in (1, -1)]
+    ends = [None if "DualInfeasible" in str(one.status) else one.obj_val for one in found]
+    return [(low, None if high is None else -high) for low, high in zip(ends[::2], ends[1::2])]
+
+
+def least_sideways(points, normals, loaded, friction, push=0.03):
+    """(k, 3) forces within friction's cones that exert the wrench with the least sum of squares, in which pushes count
+    ``push``, by Clarabel; None without any."""
+    import clarabel
+
+    matrix, pushes, rows, cones = clarabel_cones(points, normals, friction)
+    square = np.eye(matrix.shape[1]) - (1 - push) * sum(np.outer(one, one) for one in pushes)
+    start = [0.0] * sum(map(len, rows))
+    given = [*rows, -matrix], [*start, *loaded.array], [*cones, clarabel.ZeroConeT(6)]
+    found = clarabel_least(square, np.zeros(len(square)), *given)
+    return None if "Infeasible" in str(found.status) else np.reshape(found.x, (-1, 3))

@@ -121,9 +121,8 @@ class Contact:
         """Least and largest push; the second is None if unbounded. None as ``force_n``.
 
         With the units' noise it contains the push in at least 95 of 100 cases
-        (:mod:`contactfpga.robot.haptics.confidence`); without (:attr:`Wrench.noise` None) it is the range of all forces
-        that friction allows and that exert exactly this wrench. Raises :class:`~contactfpga.MissingExtra` without
-        Clarabel, which three contacts or more may need.
+        (:mod:`contactfpga.robot.haptics.cones`); without (:attr:`Wrench.noise` None) it is the range of all forces
+        that friction allows and that exert exactly this wrench.
         """
         return None if self._intervals is None else self._intervals()[self._number]
 

@@ -1,20 +1,17 @@
-"""From a wrench and touched places to contacts, by the simplest sufficient model.
-
-One and two contacts are solved in plain Python, faster than numpy for a few numbers. The wrench is corrected to the
-nearest that they can exert: a force has no moment about its point, two have none about their line.
-"""
+"""From a wrench and touched places to contacts, by the simplest sufficient model."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga.robot.haptics.cones import KNOWN, Cones
 from contactfpga.robot.haptics.contact import (
     FULL_WRENCH,
     PURE_FORCE,
+    PURE_FORCE_WITH_KNOWN_DIRECTION,
     AloneWatch,
     Contacts,
     Context,
@@ -22,17 +19,9 @@ from contactfpga.robot.haptics.contact import (
     Solution,
     Touch,
 )
-from contactfpga.robot.haptics.system import (
-    System,
-    along_normals,
-    by_least_squares,
-    distinct,
-    intervals_of,
-    within_cones,
-)
-from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, solve_symmetric
-from contactfpga.robot.haptics.wrench import Surface, Wrench
-from contactfpga.surfaces.shapes import Floats, Vector
+from contactfpga.robot.haptics.values import HapticsError, cross, dot, minus, skew
+from contactfpga.robot.haptics.wrench import ALARM, Noise, Surface, Wrench
+from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
@@ -51,12 +40,13 @@ def contacts(
 ) -> Contacts:
     """The force at each zone, or at each place in a list of :class:`Touch`; no contact ever pulls.
 
-    One contact has a closed form, two also the exact interval of each push. More have pushes along the normals if these
-    suffice, else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`); with
-    ``cones``, in the cones themselves, by Clarabel. If units do not see all six components of the wrench, or friction
-    is 0, there are only pushes along the normals. Without a zone there is the center of pressure on ``surface``.
+    Forces lie within friction's cones and have the smallest parts along the surface that exert the wrench; where
+    friction does not allow for it (:attr:`Contacts.beyond_friction`), they are of any size. Three contacts or more have
+    pushes along the normals if these suffice, and all contacts if units do not see all six components of the wrench, or
+    friction is 0. Without a zone there is the center of pressure on ``surface``.
 
     Args:
+        cones: forces within friction's cones also where pushes along the normals suffice.
         surface: the bumper's outside, for the zones' places.
         friction: of zones; a :class:`Touch` has its own.
         sheet_m: position of column 0 and row 0 on the surface laid flat.
@@ -83,17 +73,20 @@ def _tracked(zones: Zones, tracks: Tracks) -> list[int | None]:
 
 
 def _chosen(wrench: Wrench, touches: Sequence[Touch], cones: bool) -> Solution:
-    rough = [touch.friction > 0 for touch in touches]
     sees_all = wrench.noise is None or wrench.noise.rank == 6
-    if not sees_all or not any(rough):
-        return along_normals(System(wrench, touches))
-    if cones:
-        return within_cones(System(wrench, touches))
-    if len(touches) == 1:
-        return _one(wrench, touches[0])
-    if len(touches) == 2 and all(rough):
-        return _two(wrench, touches)
-    return by_least_squares(System(wrench, touches))
+    if not sees_all or not any(touch.friction for touch in touches):
+        return _Frame(wrench, touches, known=True).solution()
+    closed = _one(wrench, touches[0]) if len(touches) == 1 else _two(wrench, touches) if len(touches) == 2 else None
+    if closed is not None:
+        forces, null, chi2, beyond = closed
+        rank = 3 if len(touches) == 1 else 5
+        late = (lambda: _Frame(wrench, touches).intervals()), (lambda: _Frame(wrench, touches).covariance())
+        return Solution(PURE_FORCE, forces, late[0], rank, null, chi2, 6 - rank, touches, wrench, late[1], beyond)
+    if len(touches) > 2 and not cones:
+        pushes = _Frame(wrench, touches, known=True)
+        if pushes.suffice:
+            return pushes.solution()
+    return _Frame(wrench, touches).solution()
 
 
 def _nothing(wrench: Wrench) -> Solution:
@@ -127,266 +120,209 @@ def touched(
     return found
 
 
-ROUNDING = 1e-9
+SAME_M = 1e-9
+"""Distance below which points are identical."""
 
-NONE: Vector = (0.0, 0.0, 0.0)
+SMALL = 1e-6
+"""Share of the wrench that pushes alone may leave unexplained without noise."""
+
+EXACT = 1e-9
+"""Share of the wrench that counts as its noise where none is given, and its least size in N."""
 
 
-def _one(wrench: Wrench, touch: Touch) -> Solution:
+def distinct(touches: Sequence[Touch]) -> None:
+    """Raise :class:`HapticsError` for two touches at one place, whose forces are indistinguishable."""
+    for last, one in enumerate(touches):
+        for first in range(last):
+            if math.dist(one.point_m, touches[first].point_m) < SAME_M:
+                raise HapticsError(f"contacts {first} and {last} both lie at {one.point_m}; give one of them")
+
+
+Closed = tuple[list[Vector], list[list[float]], float | None, bool]
+"""Forces, null space, chi-square, and whether they are beyond friction."""
+
+
+def _one(wrench: Wrench, touch: Touch) -> Closed | None:
+    """The closed form of one contact, of any friction; None if it pulls."""
     force, chi2 = _at_point(wrench, touch)
     push = -dot(touch.normal, force)
-    sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
-    inside = push >= 0 and sideways <= touch.friction * push + ROUNDING * (push + 1)
-    if push < 0:
-        force, push = NONE, 0.0
-    return _solution(wrench, [touch], [force], [(push, push)], None, None if push == 0 else chi2, not inside)
+    beyond = not _within(touch, force, push)
+    return None if push < 0 else ([force], [], chi2, beyond)
 
 
-def _two(wrench: Wrench, touches: Sequence[Touch]) -> Solution:
-    """Forces at two contacts, determined up to a squeeze along their line, which friction bounds; the smallest forces
-    along the surface count, else the smallest squeeze."""
-    first, second = touches
-    (ax, ay, az), (bx, by, bz) = first.point_m, second.point_m
-    away = (ax - bx, ay - by, az - bz)
-    length = math.sqrt(dot(away, away))
-    along = (away[0] / length, away[1] / length, away[2] / length)
-    (fx, fy, fz), (gx, gy, gz), chi2 = _about_line(wrench, touches, along, length)
-    lines = (_Line((fx, fy, fz), along, first.normal), _Line((gx, gy, gz), minus(along), second.normal))
-    allowed = both(lines[0].within(first.friction), lines[1].within(second.friction))
-    beyond = allowed is None
-    if allowed is None:
-        allowed = both(lines[0].pushing(), lines[1].pushing())
-    if allowed is None:
-        return _best_alone(wrench, touches, along)
-    squeeze = least_sideways(lines, allowed)
-    forces = [lines[0].force(squeeze), lines[1].force(squeeze)]
-    return _solution(wrench, touches, forces, [line.pushes(allowed) for line in lines], along, chi2, beyond)
+def _two(wrench: Wrench, touches: Sequence[Touch]) -> Closed | None:
+    """The closed form of two contacts, at the squeeze with the smallest parts along the surface; None if that lies
+    beyond friction."""
+    (ax, ay, az), (bx, by, bz) = (touch.point_m for touch in touches)
+    length = math.dist(touches[0].point_m, touches[1].point_m)
+    along = (ax - bx) / length, (ay - by) / length, (az - bz) / length
+    middle = (ax + bx) / 2, (ay + by) / 2, (az + bz) / 2
+    split = _split(wrench.force_n, wrench.moment_nm, middle, along, length)
+    force, moment, chi2 = _about_line(wrench, along, middle, touches, split)
+    forces, curve, slope = _split(force, moment, middle, along, length), 0.0, 0.0
+    for touch, one, sign in zip(touches, forces, (1, -1)):
+        more = sign * dot(touch.normal, along)
+        curve += 1 - more * more
+        slope += sign * dot(one, along) - dot(touch.normal, one) * more
+    if curve < KNOWN:
+        return None
+    forces = [_plus(one, sign * slope / curve, along) for one, sign in zip(forces, (-1, 1))]
+    if not all(_within(touch, one, -dot(touch.normal, one)) for touch, one in zip(touches, forces)):
+        return None
+    half = math.sqrt(0.5)
+    null = [[*(half * one for one in along), *(-half * one for one in along)]]
+    return forces, null, chi2, False
 
 
 def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
-    """Force, and chi-square of the moment about the point, ideally 0."""
-    force, point = wrench.force_n, touch.point_m
+    """The force nearest to the wrench's that has no moment about the touch's point, and its distance in squares of
+    noise, to which the uncertain point adds about as with the wrench's force.
+
+    Numbers so few are faster in plain Python than in numpy.
+    """
+    force, (x, y, z) = wrench.force_n, touch.point_m
     if wrench.noise is None:
         return force, None
-    exerted = cross(point, force)
-    moment = wrench.moment_nm
-    rest = (moment[0] - exerted[0], moment[1] - exerted[1], moment[2] - exerted[2])
-    ff, fm, mm = wrench.noise.blocks
-    # Rows: covariances of the force's x, y, z, and then of the moment's, with the moment about the point.
-    with_rest = [_less(fm[axis], cross(point, ff[axis])) for axis in range(3)]
-    half = [_less(mm[axis], cross(point, (fm[0][axis], fm[1][axis], fm[2][axis]))) for axis in range(3)]
-    columns = [cross(point, (with_rest[0][axis], with_rest[1][axis], with_rest[2][axis])) for axis in range(3)]
-    spread = [[half[row][column] - columns[column][row] for column in range(3)] for row in range(3)]
-    if touch.point_sigma_m:
-        _widen(spread, touch.point_sigma_m, force)
-    share = solve_symmetric(spread, rest)
-    corrected = (
-        force[0] - dot(with_rest[0], share),
-        force[1] - dot(with_rest[1], share),
-        force[2] - dot(with_rest[2], share),
-    )
-    return corrected, dot(rest, share)
+    sides = np.array((0.0, z, -y, 1.0, 0.0, 0.0, -z, 0.0, x, 0.0, 1.0, 0.0, y, -x, 0.0, 0.0, 0.0, 1.0)).reshape(3, 6)
+    both = sides @ wrench.noise.covariance
+    (a, b, c), (_, d, e), (_, _, f) = (both @ sides.T).tolist()
+    u, v, w = (touch.point_sigma_m * part for part in force)
+    a, b, c, d, e, f = a + v * v + w * w, b - u * v, c - u * w, d + u * u + w * w, e - v * w, f + u * u + v * v
+    first, second, third = d * f - e * e, c * e - b * f, b * e - c * d  # of the adjugate
+    mixed = b * c - a * e
+    adjugate = (first, second, third), (second, a * f - c * c, mixed), (third, mixed, a * d - b * b)
+    rest = _plus(wrench.moment_nm, -1.0, cross(touch.point_m, force))
+    over = 1 / (a * first + b * second + c * third)
+    shares = [over * dot(row, rest) for row in adjugate]
+    for share, row in zip(shares, both.tolist()):
+        force = _plus(force, -share, row)
+    return force, dot(rest, shares)
 
 
 def _about_line(
-    wrench: Wrench, touches: Sequence[Touch], along: Vector, length: float
+    wrench: Wrench, axis: Vector, point: Vector, touches: Sequence[Touch], forces: Sequence[Vector]
 ) -> tuple[Vector, Vector, float | None]:
-    """Both forces without squeeze, and chi-square of the moment about their line, ideally 0."""
+    """Force and moment nearest to the wrench's that have no moment about the axis through a point, and their distance
+    in squares of noise, to which the touches' uncertain points add about as with these forces."""
     force, moment = wrench.force_n, wrench.moment_nm
-    (ax, ay, az), (bx, by, bz) = touches[0].point_m, touches[1].point_m
-    middle = ((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2)
-    # u (m - c x f) = u m - (u x c) f
-    lever = cross(along, middle)
-    rest = dot(along, moment) - dot(lever, force)
-    chi2 = None
-    if wrench.noise is not None:
-        (lx, ly, lz), (ux, uy, uz) = lever, along
-        sides = np.array((-lx, -ly, -lz, ux, uy, uz))
-        gx, gy, gz, nx, ny, nz = (wrench.noise.covariance @ sides).tolist()
-        variance = ux * nx + uy * ny + uz * nz - lx * gx - ly * gy - lz * gz
-        if touches[0].point_sigma_m or touches[1].point_sigma_m:
-            pair = _split(force, moment, middle, along, length)
-            for touch, each in zip(touches, pair):
-                side = cross(along, each)
-                variance += touch.point_sigma_m**2 * dot(side, side)
-        share = rest / variance
-        force = (force[0] - share * gx, force[1] - share * gy, force[2] - share * gz)
-        moment = (moment[0] - share * nx, moment[1] - share * ny, moment[2] - share * nz)
-        chi2 = rest * share
-    first, second = _split(force, moment, middle, along, length)
-    return first, second, chi2
+    if wrench.noise is None:
+        return force, moment, None
+    lever = cross(point, axis)
+    side, rest = np.array((*lever, *axis)), dot(lever, force) + dot(axis, moment)
+    both = wrench.noise.covariance @ side
+    spread = float(both @ side)
+    for touch, one in zip(touches, forces):
+        moved = cross(axis, one)
+        spread += touch.point_sigma_m**2 * dot(moved, moved)
+    share, row = rest / spread, both.tolist()
+    return _plus(force, -share, row), _plus(moment, -share, row[3:]), rest * share
 
 
-def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> tuple[Vector, Vector]:
+def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> list[Vector]:
     """Two forces without squeeze: half of the sum each, plus a couple about the middle."""
-    exerted = cross(middle, force)
-    couple = cross((moment[0] - exerted[0], moment[1] - exerted[1], moment[2] - exerted[2]), along)
-    x, y, z = couple[0] / length, couple[1] / length, couple[2] / length
-    fx, fy, fz = force[0] / 2, force[1] / 2, force[2] / 2
-    return (fx + x, fy + y, fz + z), (fx - x, fy - y, fz - z)
+    couple = cross(_plus(moment, -1.0, cross(middle, force)), along)
+    half = force[0] / 2, force[1] / 2, force[2] / 2
+    return [_plus(half, 1 / length, couple), _plus(half, -1 / length, couple)]
 
 
-def _widen(spread: list[list[float]], sigma: float, force: Vector) -> None:
-    """Add the effect of an uncertain point on the moment about it: sigma^2 (|f|^2 - f f^T)."""
-    square = dot(force, force)
-    for row in range(3):
-        spread[row][row] += sigma * sigma * square
-        for column in range(3):
-            spread[row][column] -= sigma * sigma * force[row] * force[column]
+def _plus(first: Sequence[float], share: float, second: Sequence[float]) -> Vector:
+    return first[0] + share * second[0], first[1] + share * second[1], first[2] + share * second[2]
 
 
-def _best_alone(wrench: Wrench, touches: Sequence[Touch], along: Vector) -> Solution:
-    """The contact that alone fits the wrench better, if two would have to pull."""
-    alone = [_one(wrench, touch) for touch in touches]
-    scores = [_misfit(each, touch) for each, touch in zip(alone, touches)]
-    best = 0 if scores[0] <= scores[1] else 1
-    forces = [NONE, NONE]
-    forces[best] = alone[best].forces_n[0]
-    intervals: list[Interval] = [(0.0, 0.0), (0.0, 0.0)]
-    intervals[best] = alone[best].intervals()[0]
-    return _solution(wrench, touches, forces, intervals, along, None, True)
+def _within(touch: Touch, force: Vector, push: float) -> bool:
+    sideways = math.sqrt(max(0.0, dot(force, force) - push * push))
+    return push >= 0 and sideways <= touch.friction * push + KNOWN * (push + 1)
 
 
-def _misfit(found: Solution, touch: Touch) -> tuple[bool, float]:
-    rest = found.residual
-    about = np.array(rest[3:]) - np.cross(touch.point_m, rest[:3])
-    return found.forces_n[0] == NONE, found.chi2 if found.chi2 is not None else float(about @ about)
+class _Frame:
+    """Forces at the contacts of one frame that explain its wrench.
+
+    ``known``: all are along the normals.
+    """
+
+    def __init__(self, wrench: Wrench, touches: Sequence[Touch], known: bool = False):
+        self._wrench, self._touches, self._known = wrench, touches, known
+        self._axes = [_axes(touch.normal) for touch in touches]
+        columns = [(*axis, *cross(touch.point_m, axis)) for touch, axes in zip(touches, self._axes) for axis in axes]
+        self._matrix = np.array(columns).T  # (6, 3k)
+        self._frictions = [0.0 if known else touch.friction for touch in touches]
+        root = _exact(wrench, touches) if wrench.noise is None else self._widened(wrench.noise).root
+        self._cones = Cones(root @ self._matrix, root @ wrench.array, self._frictions)
+        self._sizes, self._beyond = self._cones.nearest()
+        self._forces = self._turned(self._sizes)
+
+    def _widened(self, noise: Noise) -> Noise:
+        """The noise with that of uncertain places, at the smallest forces that fit."""
+        if not any(touch.point_sigma_m for touch in self._touches):
+            return noise
+        matrix = np.where(np.arange(self._matrix.shape[1]) % 3 * self._known, 0.0, noise.root @ self._matrix)
+        sizes = np.asarray(np.linalg.lstsq(matrix, noise.root @ self._wrench.array, rcond=KNOWN)[0], float)
+        turns = [touch.point_sigma_m * skew(force) for touch, force in zip(self._touches, self._turned(sizes))]
+        return noise.widened(np.asarray(sum(turn @ turn.T for turn in turns)))
+
+    def _turned(self, sizes: Floats) -> list[Vector]:
+        """Forces in the link's frame."""
+        return [vector(force) for force in np.einsum("ki,kij->kj", sizes.reshape(-1, 3), np.array(self._axes))]
+
+    @property
+    def _freedom(self) -> int:
+        return max(0, (6 if self._wrench.noise is None else self._wrench.noise.rank) - self._cones.rank)
+
+    @property
+    def suffice(self) -> bool:
+        """Whether the forces exert the wrench to within its noise."""
+        off = self._cones.misfit(self._sizes)
+        if self._wrench.noise is None:
+            return off <= (SMALL / EXACT) ** 2
+        return self._freedom == 0 or off <= ALARM[self._freedom - 1]
+
+    def intervals(self) -> list[Interval]:
+        noise = self._wrench.noise
+        sees_all = noise is None or noise.rank == 6
+        frictions = [touch.friction if sees_all else 0.0 for touch in self._touches]
+        ranges = self._cones.ranges(self._sizes, frictions, self._beyond, noise is None)
+        pushes = [-dot(touch.normal, force) for touch, force in zip(self._touches, self._forces)]
+        return [
+            (max(0.0, min(push, low)), None if high is None else max(0.0, push, high))
+            for push, (low, high) in zip(pushes, ranges)
+        ]
+
+    def _in_link(self, forces: Floats) -> Floats:
+        """(n, 3k) forces from the contacts' axes to the link's frame."""
+        return (np.array(self._axes).transpose(0, 2, 1) @ forces.reshape(-1, len(self._axes), 3, 1)).reshape(
+            forces.shape
+        )
+
+    def covariance(self) -> Floats | None:
+        root = self._in_link(self._cones.root.T)
+        return None if self._wrench.noise is None else root.T @ root
+
+    def solution(self) -> Solution:
+        cones = self._cones
+        null = cones.null[:, ::3] if self._known else self._in_link(cones.null)
+        model = PURE_FORCE_WITH_KNOWN_DIRECTION if self._known else PURE_FORCE
+        chi2 = None if self._wrench.noise is None else cones.misfit(self._sizes)
+        given = (self._touches, self._wrench, self.covariance, self._beyond)
+        return Solution(model, self._forces, self.intervals, cones.rank, null.tolist(), chi2, self._freedom, *given)
 
 
-def _solution(
-    wrench: Wrench,
-    touches: Sequence[Touch],
-    forces: list[Vector],
-    intervals: list[Interval],
-    along: Vector | None,
-    chi2: float | None,
-    beyond: bool,
-) -> Solution:
-    half = math.sqrt(0.5)
-    null = [] if along is None else [[half * one for one in along] + [-half * one for one in along]]
-    rank = 3 if along is None else 5
-    noise = wrench.noise
-    if noise is not None and chi2 is None:
-        chi2 = _chi2(wrench, touches, forces)
-    freedom = (6 if noise is None else noise.rank) - rank
-    covariance = _covariance(wrench, touches, forces)
-
-    def with_noise() -> list[Interval]:
-        return intervals if noise is None else intervals_of(_widened(wrench, touches, forces), forces, False, beyond)
-
-    return Solution(PURE_FORCE, forces, with_noise, rank, null, chi2, freedom, touches, wrench, covariance, beyond)
+def _exact(wrench: Wrench, touches: Sequence[Touch]) -> Floats:
+    """(6, 6) from a wrench without noise to standard deviations: a newton counts as much as a newton times the
+    contacts' mean distance from their barycenter, so that forces depend on neither frame nor unit."""
+    points = np.array([touch.point_m for touch in touches])
+    middle = points.mean(axis=0)
+    length = math.sqrt(float(np.square(points - middle).sum()) / len(points))
+    root = np.eye(6)
+    root[3:, :3] = -skew(middle.tolist())
+    root[3:] /= length if length > SAME_M else 1.0
+    return np.asarray(root / (EXACT * max(EXACT, float(np.linalg.norm(root @ wrench.array)))))
 
 
-def _widened(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> System:
-    system = System(wrench, touches)
-    system.places_widen(np.ravel(forces))
-    return system
-
-
-def _chi2(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> float | None:
-    system = _widened(wrench, touches, forces)
-    rest = system.wrench - system.matrix() @ np.ravel(forces)
-    return system.chi2(rest)
-
-
-def _covariance(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> Callable[[], Floats | None]:
-    def found() -> Floats | None:
-        if wrench.noise is None:
-            return None
-        system = _widened(wrench, touches, forces)
-        matrix = system.matrix()
-        return np.asarray(np.linalg.pinv(matrix.T @ system.weight @ matrix, rcond=1e-12, hermitian=True))
-
-    return found
-
-
-def _less(first: Vector, second: Vector) -> Vector:
-    return first[0] - second[0], first[1] - second[1], first[2] - second[2]
-
-
-Range = tuple[float, float]
-"""Range of the squeeze in N, possibly infinite."""
-
-
-@dataclasses.dataclass(slots=True)
-class _Line:
-    """The forces at one of two contacts: ``start`` plus any squeeze times ``along``."""
-
-    start: Vector
-    along: Vector
-    normal: Vector
-    push: float = 0.0
-    more: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.push, self.more = -dot(self.normal, self.start), -dot(self.normal, self.along)
-
-    def force(self, squeeze: float) -> Vector:
-        (x, y, z), (ax, ay, az) = self.start, self.along
-        return x + squeeze * ax, y + squeeze * ay, z + squeeze * az
-
-    def pushes(self, allowed: Range) -> Interval:
-        push, more = self.push, self.more
-        if abs(more) <= ROUNDING:
-            push = max(0.0, push)
-            return push, push
-        first, second = push + more * allowed[0], push + more * allowed[1]
-        least, largest = (first, second) if first < second else (second, first)
-        return max(0.0, least), None if largest == math.inf else max(0.0, largest)
-
-    def pushing(self) -> Range | None:
-        if abs(self.more) <= ROUNDING:
-            return (-math.inf, math.inf) if self.push >= 0 else None
-        start = -self.push / self.more
-        return (start, math.inf) if self.more > 0 else (-math.inf, start)
-
-    def within(self, friction: float) -> Range | None:
-        """Squeezes with the force in friction's cone: |f|^2 <= (1 + mu^2) push^2, a quadratic."""
-        wide = 1 + friction * friction
-        square = 1 - wide * self.more * self.more
-        slope = dot(self.start, self.along) - wide * self.push * self.more
-        level = dot(self.start, self.start) - wide * self.push * self.push
-        if abs(square) <= ROUNDING:  # the line runs along the cone
-            return both(self.pushing(), _below(2 * slope, level))
-        under = slope * slope - square * level
-        if under < 0:
-            if under < -ROUNDING * (slope * slope + abs(square * level)):
-                return None
-            under = 0.0
-        root = math.sqrt(under)
-        low, high = sorted(((-slope - root) / square, (-slope + root) / square))
-        if square < 0:
-            return (high, math.inf) if self.more > 0 else (-math.inf, low)
-        middle = self.push - self.more * slope / square
-        return (low, high) if middle >= -ROUNDING * abs(self.push) else None
-
-
-def _below(slope: float, level: float) -> Range | None:
-    if abs(slope) <= ROUNDING:
-        return (-math.inf, math.inf) if level <= ROUNDING else None
-    end = -level / slope
-    return (-math.inf, end) if slope > 0 else (end, math.inf)
-
-
-def both(first: Range | None, second: Range | None) -> Range | None:
-    """Common part of two ranges; a gap of rounding counts as a common point."""
-    if first is None or second is None:
-        return None
-    low, high = max(first[0], second[0]), min(first[1], second[1])
-    if low <= high:
-        return low, high
-    if low - high <= ROUNDING * (abs(low) + abs(high)):
-        return (low + high) / 2, (low + high) / 2
-    return None
-
-
-def least_sideways(lines: Sequence[_Line], allowed: Range) -> float:
-    """The squeeze with the smallest squared parts along the surface; if these are constant, the smallest squeeze."""
-    curve = slope = 0.0
-    for line in lines:
-        curve += 1 - line.more * line.more
-        slope += dot(line.start, line.along) - line.push * line.more
-    if curve > ROUNDING:
-        return min(max(-slope / curve, allowed[0]), allowed[1])
-    low, high = allowed
-    return low if lines[0].more + lines[1].more > 0 else high
+def _axes(normal: Vector) -> tuple[Vector, Vector, Vector]:
+    """Unit vectors inward and, two, along the surface."""
+    x, y, z = (abs(part) for part in normal)
+    least = (1.0, 0.0, 0.0) if x <= min(y, z) else (0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0)
+    first = cross(minus(normal), least)
+    length = math.hypot(*first)
+    first = first[0] / length, first[1] / length, first[2] / length
+    return minus(normal), first, cross(minus(normal), first)

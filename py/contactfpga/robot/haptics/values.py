@@ -108,19 +108,3 @@ def skew(point: Sequence[float]) -> Floats:
     """(3, 3) matrix from a force at the point to its moment about the origin."""
     x, y, z = point
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def solve_symmetric(matrix: Sequence[Sequence[float]], wanted: Vector) -> Vector:
-    """The x with ``matrix`` x = ``wanted``, for a symmetric and positive definite (3, 3) matrix."""
-    (a, b, c), (_, d, e), (_, _, f) = matrix
-    low = b / a
-    lower = c / a
-    second = d - low * b
-    mixed = e - low * c
-    third = f - lower * c - mixed * mixed / second
-    x, y, z = wanted
-    y -= low * x
-    z -= lower * x + mixed / second * y
-    z /= third
-    y = (y - mixed * z) / second
-    return (x - b * y - c * z) / a, y, z

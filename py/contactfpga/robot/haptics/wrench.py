@@ -17,8 +17,6 @@ from contactfpga.surfaces.shapes import Floats, Vector
 ALARM = (10.828, 13.816, 16.266, 18.467, 20.515, 22.458)
 """Chi-square exceeded by chance once in a thousand times, with 1 to 6 degrees of freedom."""
 
-Block = tuple[Vector, ...]
-
 
 class Noise:
     """The covariance of a wrench; one object serves all wrenches of the same units."""
@@ -52,13 +50,6 @@ class Noise:
         return values, vectors, over
 
     @functools.cached_property
-    def blocks(self) -> tuple[Block, Block, Block]:
-        """Covariances of forces, of force and moment, and of moments, in plain numbers."""
-        parts = (self.covariance[:3, :3], self.covariance[:3, 3:], self.covariance[3:, 3:])
-        force, both, moment = (tuple(map(tuple, part.tolist())) for part in parts)
-        return force, both, moment
-
-    @functools.cached_property
     def information(self) -> Floats:
         """(6, 6): inverse of the covariance, without weight for a component that the units do not see."""
         return np.asarray(self.root.T @ self.root)
@@ -79,7 +70,10 @@ class Noise:
             seen = vectors[:, values > 1e-9 * values[-1]]
             kept = np.sqrt(np.diag(self.covariance))[:, None] * (seen @ seen.T) * over
             more = kept @ more @ kept.T
-        return Noise(self.covariance + more)
+        made = Noise(self.covariance + more)
+        if self.rank == 6:
+            made.root = np.asarray(np.linalg.inv(np.linalg.cholesky(made.covariance)), float)  # sooner than by spectrum
+        return made
 
     @functools.cached_property
     def rank(self) -> int:

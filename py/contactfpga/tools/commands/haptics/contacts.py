@@ -15,7 +15,7 @@ EXTRA = "haptics"
 
 def add_flags(flag: flags.Flags) -> None:
     flag("FILE.json", "The wrench, with contacts or a surface; docs/haptics.md has the format.")
-    flag("--cones", "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices.")
+    flag("--cones", "Take forces within friction's cones also where pushes along the normals suffice.")
     flags.json(flag, flags.SI)
 
 
