@@ -12,7 +12,6 @@ from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.design import buildable, kits
 from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, load_circuit
-from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.skin import SkinError
 from contactfpga.tools import cli
@@ -79,7 +78,7 @@ def test_the_circuit_that_a_kit_states_covers_that_of_its_sheet(name):
     """Lines of the layout, with 0.3 m of cable, are no slower than the Skin's times were chosen for."""
     kit = kits.kit(name)
     stated = load_circuit(kit.skin_path)
-    found = extracted(lay_out(kit.skin, stated), 0.3).circuit
+    found = extracted(kit.layout, 0.3).circuit
     for value in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm"):
         assert getattr(stated, value) >= getattr(found, value) > 0, value
     check_times(found, kit.skin)

@@ -11,14 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy import ndimage
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import load_circuit, needed
+from contactfpga.design.circuit import needed
 from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import KitError
 from contactfpga.design.predictions import Prediction
-from contactfpga.design.sheet import lay_out
+from contactfpga.design.sheet import orders
+from contactfpga.design.sheet.caps import caps
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
 from contactfpga_sim.lab.arm import kits as kits_arm
@@ -49,7 +51,7 @@ def test_predictions_are_what_is_computed_today(name):
     """The cheap ones, each by other means than the file's: circuit by its model, times by a part of the touches."""
     kit = kits.kit(name)
     found = predictions.load(kit)
-    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    circuit = extracted(kit.layout).circuit
     needs = needed(circuit, kit.skin.row_lines, kit.skin.column_lines)
     assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
     assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
@@ -176,14 +178,38 @@ def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monke
 def test_the_tutorial_lists_the_parts_of_the_starter_kit():
     page = Path("docs/starter.md").read_text(encoding="utf-8")
     kit = kits.kit("starter")
-    placed = lay_out(kit.skin, load_circuit(kit.skin_path)).drawing.placed
-    counted = Counter((one.part.order.split(",")[0], one.value) for one in placed)
-    wanted = sorted((count, float(value) if value.isdigit() else 0.0) for (_, value), count in counted.items())
+    placed = kit.layout.drawing.placed
+    counted = Counter((one.part.name, one.value if one.value.isdigit() else "") for one in placed if one.value)
+    wanted = sorted((count, float(value or 0)) for (_, value), count in counted.items())
+    numbers = {one.part.number(one.value) for one in placed}
+    assert all(number in page for number in numbers)
     rows = re.findall(r"^\| (\d+) \| [^|]* \| (?:(\d+) (k?)Ω )?\|$", page, re.MULTILINE)
     assert sorted((int(count), float(ohm or 0) * (1000 if kilo else 1)) for count, ohm, kilo in rows) == wanted
     beside = re.findall(r"^\| (\d+) \| ([^|]*) \|$", page, re.MULTILINE)
     assert [int(count) for count, _ in beside] == [part.count for part in kit.parts]
     assert all(part.number in what for part, (_, what) in zip(kit.parts, beside, strict=True))
+
+
+@pytest.mark.parametrize(("name", "column"), [("starter", 1), ("fast", 2)])
+def test_size_mass_and_height_of_a_kit_are_those_of_its_files(tmp_path, name, column):
+    """Caps are measured by trimesh, the board's outline by its file's corners."""
+    kit, page = kits.kit(name), Path("docs/kits.md").read_text(encoding="utf-8")
+    rows = [
+        line.split("|")[1:-1] for line in page.splitlines() if re.match(r"\| (board of the|height|mass|the same)", line)
+    ]
+    board, height, mass, square = (row[column].strip() for row in rows)
+    found = re.search(r"^size: +(\S+) x (\S+) mm", orders.note(kit.layout), re.MULTILINE)
+    width, length = map(float, found.groups())
+    cover = load_cover(kit.skin_path)
+    layer = caps(kit.skin, kit.layout.switch, 1e3 * cover.cap.side_m)
+    (tmp_path / "caps.stl").write_bytes(layer.stl())
+    mesh, foam_mm = trimesh.load(tmp_path / "caps.stl"), 1e3 * cover.thickness_m
+    side_mm = kit.skin.columns * kit.skin.pitch_x_mm
+    grams = [width * length * 1.6 * 1.85e-3, mesh.volume * 1.01e-3, side_mm**2 * foam_mm * 33e-6]
+    assert board == f"{width:.1f} x {length:.1f} mm"
+    assert mass == "{:.0f} + {:.0f} + {:.1f} g".format(*grams)
+    assert square == f"{sum(grams) / side_mm**2 * 1e3:.1f} kg"
+    assert height == f"{20 + 1.6 + kit.layout.switch.height_mm + np.ptp(mesh.bounds[:, 2]) + foam_mm:.1f} mm"
 
 
 def test_a_scene_is_miscounted_whose_zones_are_not_as_many_as_its_contacts():

@@ -6,7 +6,6 @@ from contactfpga.design import kits
 from contactfpga.design.circuit import load_circuit, needed_by, patterns, phases
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
-from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.model.sheet import agreement
 
@@ -27,8 +26,7 @@ PHASES = {
 @pytest.mark.parametrize("name", kits.names())
 def test_times_are_enough_at_the_corners(name, celsius, supply_v):
     skin = kits.kit(name).skin
-    stated = load_circuit(kits.kit(name).skin_path)
-    circuit = extracted(lay_out(skin, stated)).circuit.replace(supply_v=supply_v)
+    circuit = extracted(kits.kit(name).layout).circuit.replace(supply_v=supply_v)
     needs = needed_by(skin, circuit)
     for what in PHASES if skin.reads_rows else ("settle", "precharge"):
         pattern = getattr(needs, what).pattern

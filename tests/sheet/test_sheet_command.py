@@ -1,8 +1,10 @@
 """`contactfpga sheet`: its files, what it prints, and how it fails."""
 
+import dataclasses
 import json
 import re
 import shlex
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -15,10 +17,8 @@ from contactfpga.tools import cli
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 ALL = {
-    *(f"sheet-{side}-{kind}.gbr" for side in ("top", "bottom") for kind in ("copper", "mask", "paste", "print")),
-    *("sheet-edge.gbr", "sheet-plated.drl", "sheet-unplated.drl", "sheet.ipc", "sheet.net"),
-    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.svg", "sheet-caps.stl", "skin.toml"),
-    *("sheet-parts.csv", "sheet-placement.csv", "sheet-connectors.csv"),
+    *("sheet-board.zip", "sheet-bom.csv", "sheet-cpl.csv", "sheet-assembly.svg", "sheet-connectors.csv"),
+    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.net", "sheet.svg", "sheet-caps.stl", "skin.toml"),
 }
 
 
@@ -36,7 +36,12 @@ def test_all_files_are_there_and_the_circuit_is_complete(tmp_path, skin, capsys)
     answer = json.loads(capsys.readouterr().out)
     assert {path.name for path in out.iterdir()} == ALL == set(answer["files"])
     circuit = load_circuit(out / "skin.toml")
-    assert Skin.load(out / "skin.toml") == Skin.load(skin)
+    given = {name: one["needed"] for name, one in answer["times"].items()}
+    assert Skin.load(out / "skin.toml") == dataclasses.replace(Skin.load(skin), **given)
+    note = zipfile.ZipFile(out / "sheet-board.zip").read("fabrication.txt").decode()
+    assert all(
+        words in note for words in ("ENIG", "FR-4, 1.6 mm", "tented", "{:.2f} x {:.2f} mm".format(*answer["board_mm"]))
+    )
     assert {name: getattr(circuit, name) for name in answer["circuit"]} == answer["circuit"]
     assert answer["parts"]["DOME_5MM_4LEG"] == 16
     assert answer["caps"]["gap_mm"] == 0.6
@@ -56,14 +61,35 @@ def test_text_says_the_same(tmp_path, skin, capsys):
     assert "16 of 5.8 mm, 0.6 mm apart" in said
 
 
-@pytest.mark.parametrize(("pitch", "step"), [(6.4, "a larger pitch, or the part dome\n"), (5.08, "a larger pitch\n")])
+FINER = [(6.4, "take --part dome\n"), (5.08, "take --part dome and pitch_x_mm = 5.52 and pitch_y_mm = 5.2\n")]
+
+
+@pytest.mark.parametrize(("pitch", "step"), FINER)
 def test_a_cell_finer_than_its_parts_is_refused_in_one_line(tmp_path, skin, capsys, pitch, step):
     skin.write_text(skin.read_text().replace("6.4", str(pitch)))
     assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "new" / "out"), "--part", "tact"]) == 1
     said = capsys.readouterr().err
     assert f"pitch_x_mm is {pitch}; a cell with TACT_4.5MM" in said
-    assert said.endswith(f"choose {step}")
+    assert said.endswith(f"needs 7 mm: set pitch_x_mm = 7 or more, or {step}")
     assert not (tmp_path / "new").exists()
+
+
+def test_without_kicad_a_sheet_to_be_checked_is_refused_before_anything_is_written(tmp_path, skin, capsys, monkeypatch):
+    monkeypatch.setattr(check, "there", lambda: False)
+    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--kicad"]) == 1
+    assert "apt install" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("times", ["", "release_us = 0.9  # mine\n"])
+def test_the_file_has_the_times_that_its_own_circuit_needs(tmp_path, skin, capsys, times):
+    skin.write_text(times + skin.read_text(encoding="utf-8-sig"))
+    cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--json"])
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer["times"]) == {"release_us"}
+    assert answer["times"]["release_us"]["given"] == Skin.load(skin).release_us
+    assert cli.main(["settle", "--skin", str(tmp_path / "out" / "skin.toml")]) == 0
+    assert "mine" not in times or "# mine" in (tmp_path / "out" / "skin.toml").read_text()
 
 
 @pytest.mark.skipif(not check.there(), reason="KiCad 6 is not installed")

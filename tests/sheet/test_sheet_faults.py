@@ -10,11 +10,11 @@ import pytest
 pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 
-from traced_board import TracedBoard, lines_of
+import traced_board
+from traced_board import TracedBoard, lines_of, written
 
 from contactfpga import Skin
-from contactfpga.design.sheet import check, files, lay_out
-from contactfpga.design.sheet.caps import caps
+from contactfpga.design.sheet import check
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 
@@ -23,8 +23,7 @@ SMALL = Skin(rows=3, columns=4, pitch_x_mm=6.4, pitch_y_mm=6.4)
 
 @pytest.fixture
 def folder(tmp_path):
-    layout = lay_out(SMALL)
-    files.write(tmp_path, layout, caps(SMALL, layout.switch), "")
+    written(tmp_path, SMALL)
     return tmp_path
 
 
@@ -35,14 +34,17 @@ def changed(path, old, new):
 
 
 def test_a_missing_via_is_seen(folder):
-    # of the diode of cell (2, 3)
-    changed(folder / "sheet-plated.drl", "X19.200000Y-12.200000\n", "")
+    found = re.search(r"^317N2_3 .*VIA.*X([+-]\d{6})Y([+-]\d{6})", (folder / "sheet.ipc").read_text(), re.MULTILINE)
+    x, y = (int(um) / 1e3 for um in found.groups())
+    changed(folder / "sheet-PTH.drl", f"X{x:.6f}Y{y:.6f}\n", "")
     assert TracedBoard(folder).disagreements() == ["N2_3 is in 2 pieces"]
 
 
 def test_a_bridge_between_two_columns_is_seen(folder):
-    path = folder / "sheet-top-copper.gbr"
-    bridge = "X1660000Y1660000D02*\nX4740000Y1660000D01*\n"
+    path = folder / "sheet-F_Cu.gtl"
+    x, y = TracedBoard(folder).switches["SW1"]
+    ends = ((x + 1.66, 2), (x + 4.74, 1))
+    bridge = "".join(f"X{round(at * 1e6)}Y{round((y + 1.66) * 1e6)}D0{code}*\n" for at, code in ends)
     text = path.read_text()
     code = re.search(r"%ADD(\d+)C,0.200000\*%", text)[1]
     changed(path, f"\nD{code}*\n", f"\nD{code}*\n{bridge}")
@@ -94,13 +96,11 @@ def test_the_same_skin_gives_the_same_bytes(folder, tmp_path):
     other = tmp_path / "again"
     other.mkdir()
     script = (
-        "import sys; from pathlib import Path; from contactfpga import Skin; "
-        "from contactfpga.design.sheet import files, lay_out; from contactfpga.design.sheet.caps import caps; "
-        "skin = Skin(rows=3, columns=4, pitch_x_mm=6.4, pitch_y_mm=6.4); layout = lay_out(skin); "
-        "files.write(Path(sys.argv[1]), layout, caps(skin, layout.switch), '')"
+        "import sys; from pathlib import Path; from contactfpga import Skin; from traced_board import written; "
+        "written(Path(sys.argv[1]), Skin(rows=3, columns=4, pitch_x_mm=6.4, pitch_y_mm=6.4))"
     )
     for seed in ("1", "2"):
-        env = os.environ | {"PYTHONHASHSEED": seed}
+        env = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": os.path.dirname(traced_board.__file__)}
         subprocess.run([sys.executable, "-c", script, str(other)], check=True, env=env, timeout=250)
         for path in other.iterdir():
             assert path.read_bytes() == (folder / path.name).read_bytes(), path.name

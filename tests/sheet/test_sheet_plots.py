@@ -11,11 +11,10 @@ pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 
 from gerbonara import ExcellonFile, GerberFile
 from gerbonara.utils import MM
-from traced_board import PIXEL_MM, TracedBoard, drawn_layer
+from traced_board import PIXEL_MM, TracedBoard, drawn_layer, written
 
 from contactfpga import Skin
-from contactfpga.design.sheet import check, files, lay_out
-from contactfpga.design.sheet.caps import caps
+from contactfpga.design.sheet import check
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -44,15 +43,23 @@ drill = pcbnew.EXCELLON_WRITER(board)
 drill.SetFormat(True)
 drill.CreateDrillandMapFilesSet(sys.argv[2], True, False)
 """
-LAYERS = [f"{side}-{kind}" for side in ("top", "bottom") for kind in ("copper", "mask", "paste", "print")]
+LAYERS = {
+    f"{name}_{kind}": f"{layer}_{file}"
+    for name, layer, side in (("top", "F", "t"), ("bottom", "B", "b"))
+    for kind, file in (
+        ("copper", f"Cu.g{side}l"),
+        ("mask", f"Mask.g{side}s"),
+        ("paste", f"Paste.g{side}p"),
+        ("print", f"Silkscreen.g{side}o"),
+    )
+}
 
 
 @pytest.fixture(scope="module", params=sorted(SKINS))
 def folder(request, tmp_path_factory):
     place = tmp_path_factory.mktemp("plots")
     skin, part = SKINS[request.param]
-    layout = lay_out(skin, part=part)
-    files.write(place, layout, caps(skin, layout.switch), "")
+    written(place, skin, part)
     return place
 
 
@@ -73,21 +80,24 @@ def one(folder, pattern):
 
 @pytest.mark.parametrize("name", LAYERS)
 def test_each_layer_is_the_one_that_kicad_plots(folder, plotted, name):
-    edges = [GerberFile.open(path) for path in (folder / "sheet-edge.gbr", one(plotted, "*edge.gbr"))]
+    edges = [GerberFile.open(path) for path in (folder / "sheet-Edge_Cuts.gm1", one(plotted, "*edge.gbr"))]
     (low, high), (other, _) = (edge.bounding_box(MM) for edge in edges)
     # KiCad's page begins elsewhere
-    ours = drawn_layer(folder / f"sheet-{name}.gbr", low, high).pixels
     moved = np.subtract(other, low)
-    theirs = drawn_layer(one(plotted, f"*{name.replace('-', '_')}.gbr"), np.add(low, moved), np.add(high, moved)).pixels
-    assert ours.any() or (name == "top-paste" and not theirs.any())
+    theirs = drawn_layer(one(plotted, f"*{name}.gbr"), np.add(low, moved), np.add(high, moved)).pixels
+    if not theirs.any():  # nothing to paste on the top: no stencil
+        assert name == "top_paste"
+        assert not (folder / f"sheet-{LAYERS[name]}").exists()
+        return
+    ours = drawn_layer(folder / f"sheet-{LAYERS[name]}", low, high).pixels
     differs = cv2.morphologyEx(ours ^ theirs, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     assert not differs.any(), f"{np.argwhere(differs)[:3] * PIXEL_MM} mm"
 
 
-@pytest.mark.parametrize(("ours", "theirs"), [("plated", "PTH"), ("unplated", "NPTH")])
-def test_the_holes_are_those_that_kicad_drills(folder, plotted, ours, theirs):
+@pytest.mark.parametrize("name", ["PTH", "NPTH"])
+def test_the_holes_are_those_that_kicad_drills(folder, plotted, name):
     found = []
-    for path in (folder / f"sheet-{ours}.drl", one(plotted, f"*-{theirs}.drl")):
+    for path in (folder / f"sheet-{name}.drl", one(plotted, f"*-{name}.drl")):
         holes = [(MM(h.x, h.unit), MM(h.y, h.unit), round(h.tool.diameter, 3)) for h in ExcellonFile.open(path).objects]
         corner = np.min(np.array(holes), axis=0)
         found.append(sorted((round(x - corner[0], 2), round(y - corner[1], 2), size) for x, y, size in holes))

@@ -3,18 +3,21 @@
 import dataclasses
 import random
 import re
+import zipfile
 
 import pytest
+from random_sheet import drawn, refused
 from sample import sample
 
 pytest.importorskip("gerbonara", reason="gerbonara is not installed")
 pytest.importorskip("cv2", reason="OpenCV is not installed")
 
-from traced_board import TracedBoard, lines_of
+from traced_board import TracedBoard, lines_of, written
 
 from contactfpga import Skin
 from contactfpga.boards import BOARDS, wiring
-from contactfpga.design.sheet import files, lay_out
+from contactfpga.design import kits
+from contactfpga.design.sheet import files
 from contactfpga.design.sheet.caps import caps
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
@@ -49,12 +52,6 @@ SKINS = {
 }
 QUICK = {"8x8", "16x16 guard", "12x20 registers", "6x5 reversal", "10x9 165", "9x12 closed guard", "masked", "1x1"}
 SLOW = {"24x32 closed"}
-
-
-def written(folder, skin, part="dome"):
-    layout = lay_out(skin, part=part)
-    files.write(folder, layout, caps(skin, layout.switch), "")
-    return layout
 
 
 def wide_board(skin):
@@ -99,7 +96,7 @@ def check_against_the_wiring_table(board, skin, series=33.0, pulls=None):
         else:
             continue
         seen.add(wire.port)
-    assert seen == set(wires) - {"3V3", "GND"}
+    assert seen == set(wires) - {"3V3", "GND", "contact", "alive"}
     used = set()
     for output in wiring.outputs(skin):
         leads(board.pad(chips[output.chip, output.chain, output.number], output.pin), output.line)
@@ -133,7 +130,7 @@ def named_chips(board, skin, wires):
     ways = {"74HC595": ("row_data", skin.row_chains, 14, 9), "74HC165": ("column_data", skin.column_chains, 9, 10)}
     found = {}
     for kind, (port, chains, first, after) in ways.items():
-        names = [name for name in board.parts("U") if board.placed[name][0] == kind]
+        names = [name for name in board.parts("U") if board.values[name] == kind]
         starts = {board.pad(name, first): name for name in names}
         for chain in range(chains if names else 0):
             copper, number = wires[port if chains == 1 else f"{port}[{chain}]"], 0
@@ -164,3 +161,33 @@ def test_copper_is_the_wiring_table(tmp_path, name):
     skin, part = SKINS[name]
     written(tmp_path, skin, part)
     check_against_the_wiring_table(TracedBoard(tmp_path), skin)
+
+
+RIBBON = {"1": 1, "7": 2, "2": 3, "8": 4, "3": 5, "9": 6, "4": 7, "10": 8, "5": 9, "11": 10, "6": 11, "12": 12}
+"""Wire of a flat cable at each pin of a PMOD socket: 1 to 6 in one row, 7 to 12 in the other."""
+
+
+def test_three_flat_cables_join_the_starter_kit_to_its_board(tmp_path):
+    kit = kits.kit("starter")
+    files.write(tmp_path, kit.layout, caps(kit.skin, kit.layout.switch), "")
+    zipfile.ZipFile(tmp_path / "sheet-board.zip").extractall(tmp_path)
+    board = TracedBoard(tmp_path)
+    check_against_the_wiring_table(board, kit.skin, pulls={"column": 47_000.0})
+    sockets = {"PMOD1A": "J1", "PMOD1B": "J2", "PMOD2": "J3"}
+    for wire in wiring.wires(kit.board, kit.skin):
+        if wire.pin:
+            connector, number = kit.board.label(wire.pin).split()
+            assert board.pad(sockets[connector], RIBBON[number]) == board.connectors[wire.port], wire
+    for name in sockets.values():
+        grounds, supplies = ({board.pad(name, RIBBON[pin]) for pin in pins} for pins in (("5", "11"), ("6", "12")))
+        assert (grounds, supplies) == ({board.connectors["GND"]}, {board.connectors["3V3"]})
+    for number, port in enumerate(("contact", "GND", "alive"), 1):
+        assert board.pad("J4", number) == board.connectors[port]
+
+
+@pytest.mark.parametrize("seed", sample(range(20), quick=[4], slow=[5, 6]))
+def test_copper_of_random_sheets_is_the_wiring_table(tmp_path, seed):
+    skin, part = drawn(seed)
+    if not refused(skin, part):
+        written(tmp_path, skin, part)
+        check_against_the_wiring_table(TracedBoard(tmp_path), skin)

@@ -1,6 +1,7 @@
 """The numbers in the diagrams, which are committed drawings, are those of commands, pages and code."""
 
 import contextlib
+import csv
 import io
 import json
 import re
@@ -15,6 +16,7 @@ from contactfpga.boards import wiring
 from contactfpga.design import kits
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import load_cover
+from contactfpga.design.sheet import files
 from contactfpga.design.sheet.caps import PLATE_MM, caps
 from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.parts import DOME
@@ -106,10 +108,23 @@ def test_the_wiring_is_the_table_that_the_command_prints():
 
 
 def test_the_wiring_shows_where_the_sheet_has_each_column():
-    """Beside the pins of the sheet, in their order, as in the list that ``contactfpga sheet`` writes."""
-    texts = [one.text for one in sorted(words("wiring"), key=lambda one: middle(one)[1]) if middle(one)[0] > 375]
-    columns = [text for text in texts if re.fullmatch(r"(guard )?column( \d+)?", text)]
-    assert columns == [*(f"column {number}" for number in range(SKIN.columns)), "guard column"]
+    """Right of each pin's number, below the name of its header, as in the list that ``contactfpga sheet`` writes."""
+    picture = words("wiring")
+    headers = {one.text.split()[0]: middle(one)[1] for one in picture if re.match(r"J\d ", one.text)}
+    shown = set()
+    for one in picture:
+        if re.fullmatch(r"(guard )?column( \d+)?", one.text):
+            x, y = middle(one)
+            header = max((name for name, place in headers.items() if place < y), key=headers.get)
+            left = [n for n in picture if abs(middle(n)[1] - y) < 3 and n.text.isdigit() and middle(n)[0] < x]
+            shown.add(
+                (header, max(left, key=lambda n: middle(n)[0]).text, one.text.replace("guard column", "column GUARD"))
+            )
+    listed = csv.DictReader(files.connectors_list(KIT.layout).splitlines())
+    columns = {(row["connector"], row["pin"], row["line"]) for row in listed if row["line"].startswith("COL")}
+    assert shown == {
+        (header, pin, line.replace("COL_", "COL").replace("COL", "column ")) for header, pin, line in columns
+    }
 
 
 def test_the_wiring_names_the_parts_on_the_sheet():

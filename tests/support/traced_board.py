@@ -1,7 +1,7 @@
 """What a sheet's files say is joined: Gerbers and drill read by gerbonara, drawn as images, and their copper labeled.
 
-Shares no code with the layout. Which pad lies where comes from the file for the board's electrical test, read by
-gerbonara as well; what is joined comes from the copper alone.
+The reading shares no code with the layout. Which pad lies where comes from the file for the board's electrical test,
+read by gerbonara as well; what is joined comes from the copper alone.
 """
 
 import csv
@@ -9,6 +9,7 @@ import functools
 import itertools
 import math
 import warnings
+import zipfile
 from collections import defaultdict
 
 import cv2
@@ -16,6 +17,9 @@ import numpy as np
 from gerbonara import ExcellonFile, GerberFile
 from gerbonara.ipc356 import Netlist, PadType
 from gerbonara.utils import MM
+
+from contactfpga.design.sheet import files, lay_out
+from contactfpga.design.sheet.caps import caps
 
 PIXEL_MM = 0.05
 """A quarter of the clearance."""
@@ -77,6 +81,14 @@ def drawn_layer(path, low, high):
     return image
 
 
+def written(folder, skin, part="dome", **given):
+    """Lay out a sheet and write its files into a folder, those for the board house unpacked."""
+    layout = lay_out(skin, part=part, **given)
+    files.write(folder, layout, caps(skin, layout.switch), "")
+    zipfile.ZipFile(folder / "sheet-board.zip").extractall(folder)
+    return layout
+
+
 class TracedBoard:
     """The board in a folder of files; ``folder`` may have been tampered with."""
 
@@ -84,20 +96,20 @@ class TracedBoard:
         self.folder, self.name = folder, name
         left, bottom, right, top = self._edge()
         self._layers, self._images = {}, {}
-        for side in ("top", "bottom"):
-            image = drawn_layer(folder / f"{name}-{side}-copper.gbr", (left, bottom), (right, top))
+        for side, copper in (("top", "F_Cu.gtl"), ("bottom", "B_Cu.gbl")):
+            image = drawn_layer(folder / f"{name}-{copper}", (left, bottom), (right, top))
             self._layers[side], self._images[side] = image.labels(), image
         self._join()
         self._read_pads()
 
     def _edge(self):
-        (a, b), (c, d) = GerberFile.open(self.folder / f"{self.name}-edge.gbr").bounding_box(MM)
+        (a, b), (c, d) = GerberFile.open(self.folder / f"{self.name}-Edge_Cuts.gm1").bounding_box(MM)
         return a, b, c, d
 
     def _join(self):
         """Union of the labels of both sides, by the plated holes."""
         self._parent = {}
-        holes = ExcellonFile.open(self.folder / f"{self.name}-plated.drl").objects
+        holes = ExcellonFile.open(self.folder / f"{self.name}-PTH.drl").objects
         for hole in holes:
             x, y = MM(hole.x, hole.unit), MM(hole.y, hole.unit)
             ends = [(side, self._label(side, x, y)) for side in self._layers]
@@ -123,7 +135,7 @@ class TracedBoard:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             records = Netlist.open(self.folder / f"{self.name}.ipc").test_records
-        self.pads, self.said, self.places = defaultdict(list), {}, {}
+        self.pads, self.said, self.places, self._spots = defaultdict(list), {}, {}, defaultdict(list)
         for one in records:
             side = "bottom" if one.access_layer == 2 else "top"
             where = self.copper(side, MM(one.x, one.unit), MM(one.y, one.unit))
@@ -133,6 +145,7 @@ class TracedBoard:
             assert one.pad_type in (PadType.SMD_PAD, PadType.THROUGH_HOLE)
             self.pads[one.ref_des, one.pin].append(where)
             self.places[one.ref_des, one.pin] = MM(one.x, one.unit), MM(one.y, one.unit)
+            self._spots[one.ref_des].append(self.places[one.ref_des, one.pin])
             self.said.setdefault(where, set()).add(one.net_name)
 
     def pad(self, reference, pin):
@@ -140,18 +153,27 @@ class TracedBoard:
         (found,) = set(self.pads[reference, str(pin)])
         return found
 
+    def rows(self, name):
+        with open(self.folder / f"{self.name}-{name}.csv") as file:
+            return list(csv.DictReader(file))
+
     @functools.cached_property
-    def placed(self):
-        """(value, footprint, x, y) by reference."""
-        with open(self.folder / f"{self.name}-placement.csv") as file:
-            rows = list(csv.DictReader(file))
-        return {
-            row["reference"]: (row["value"], row["footprint"], float(row["x_mm"]), float(row["y_mm"])) for row in rows
-        }
+    def values(self):
+        """The value of each part in the assembler's list."""
+        return {name: row["Comment"] for row in self.rows("bom") for name in row["Designator"].split(",")}
+
+    @functools.cached_property
+    def switches(self):
+        """Middle of each switch, by reference, in mm from the board's lower left corner."""
+        return {name: self.middle(name) for name in self.parts("SW")}
+
+    def middle(self, name):
+        """Mean place of a part's pads in mm."""
+        return tuple(np.mean(self._spots[name], axis=0))
 
     def parts(self, letter):
         """References that begin with this letter and a digit."""
-        return [name for name in self.placed if name.rstrip("0123456789") == letter]
+        return sorted({name for name, _ in self.pads if name.rstrip("0123456789") == letter})
 
     @functools.cached_property
     def resistors(self):
@@ -159,7 +181,7 @@ class TracedBoard:
         found = defaultdict(list)
         for name in self.parts("R"):
             a, b = self.pad(name, 1), self.pad(name, 2)
-            ohms = float(self.placed[name][0])
+            ohms = float(self.values[name])
             found[a].append((b, ohms))
             found[b].append((a, ohms))
         return found
@@ -173,9 +195,8 @@ class TracedBoard:
     def connectors(self):
         """Copper of each wire's pins, by the wire's name."""
         found = defaultdict(set)
-        with open(self.folder / f"{self.name}-connectors.csv") as file:
-            for row in csv.DictReader(file):
-                found[row["wire"]].add(self.pad(row["connector"], row["pin"]))
+        for row in self.rows("connectors"):
+            found[row["wire"]].add(self.pad(row["connector"], row["pin"]))
         return {name: one for name, (one,) in ((name, list(pieces)) for name, pieces in found.items())}
 
     def disagreements(self):
@@ -193,15 +214,21 @@ def lines_of(board, skin):
     """Copper of each row, and of each column, found from where the switches are and how their diodes lie; and the guard
     row's and column's. Asserts that each cell has its switch and its diode."""
     masked = set(skin.mask)
-    at = {(x, y): name for name, (_, _, x, y) in board.placed.items() if name.startswith("SW")}
+    cells = set(itertools.product(range(skin.rows), range(skin.columns))) - masked
+    at = {place: name for name, place in board.switches.items()}
+    corner = at and (  # of cell (0, 0)
+        min(x for x, _ in at) - min(column for _, column in cells) * skin.pitch_x_mm,
+        max(y for _, y in at) + min(row for row, _ in cells) * skin.pitch_y_mm,
+    )
     by_node = defaultdict(list)
     for anode, cathode in board.diodes:
         by_node[anode].append(("out", cathode))
         by_node[cathode].append(("in", anode))
     rows, columns = defaultdict(set), defaultdict(set)
     for row, column in itertools.product(range(skin.rows), range(skin.columns)):
-        place = min(at, key=lambda xy: math.dist(xy, (column * skin.pitch_x_mm, -row * skin.pitch_y_mm)), default=None)
-        near = place and math.dist(place, (column * skin.pitch_x_mm, -row * skin.pitch_y_mm)) < 1e-3
+        wanted = corner and (corner[0] + column * skin.pitch_x_mm, corner[1] - row * skin.pitch_y_mm)
+        place = min(at, key=lambda xy: math.dist(xy, wanted), default=None)
+        near = place and math.dist(place, wanted) < 2e-3
         assert bool(near) == ((row, column) not in masked), f"switch at {row}, {column}"
         if not near:
             continue

@@ -106,6 +106,20 @@ class BoardSpec:
     held_high: tuple[str, ...] = ()
     """FPGA pins that other chips on the board need high."""
 
+    def pmods(self, skin: Skin) -> dict[str, dict[str, str]]:
+        """Wire at each pin of each PMOD socket, by the socket's connector, `contact` too; empty if other connectors
+        have wires of this Skin as well."""
+        wires = {
+            pin: port if len(pins) == 1 else f"{port}[{bit}]"
+            for port, pins in self.pins(skin).items()
+            for bit, pin in enumerate(pins)
+        }
+        found: dict[str, dict[str, str]] = {}
+        for pin, wire in {**wires, self.contact: "contact"}.items():
+            connector, _, number = pin.partition(":")
+            found.setdefault(connector, {})[number] = wire
+        return dict(sorted(found.items())) if all(name.startswith("pmod_") for name in found) else {}
+
     @property
     def lines(self) -> int:
         """Number of pins for wires to the sheet."""

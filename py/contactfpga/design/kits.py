@@ -8,6 +8,8 @@ from pathlib import Path
 
 from contactfpga.boards import find
 from contactfpga.boards.spec import BoardSpec, bitstream_path
+from contactfpga.design.circuit import load_circuit
+from contactfpga.design.sheet import Layout, lay_out
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
@@ -53,6 +55,11 @@ class Kit:
     @functools.cached_property
     def skin(self) -> Skin:
         return self.board.load(self.skin_path)
+
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """The sheet as ``contactfpga sheet --kit`` lays it out, with headers for the kit's board."""
+        return lay_out(self.skin, load_circuit(self.skin_path), board=self.board)
 
 
 def names() -> list[str]:

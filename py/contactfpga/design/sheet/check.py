@@ -30,11 +30,16 @@ def there() -> bool:
         return False
 
 
+def require() -> None:
+    """Raise :class:`MissingTool` without KiCad."""
+    if not there():
+        raise MissingTool("--kicad", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
+
+
 def findings(board: Path) -> list[str]:
     """KiCad's findings for a .kicad_pcb file. Raises :class:`MissingTool` without KiCad and :class:`SheetError` for an
     unreadable file."""
-    if not there():
-        raise MissingTool("--kicad", "KiCad 6 (its module pcbnew)", "apt install --no-install-recommends kicad")
+    require()
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.txt"
         done = subprocess.run(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import re
 from typing import Literal
 
 from contactfpga.design.sheet.parts import Pad, Part
@@ -21,9 +22,11 @@ VIA_MM = 0.6
 VIA_DRILL_MM = 0.3
 EDGE_MM = 0.3
 """Clearance between copper and the board's edge."""
-PRINT_MM = 0.12
-MASK_MM = 0.05
-"""Growth of a solder mask opening over its pad on each side."""
+PRINT_MM = 0.15
+TEXT_MM = 1.0
+"""Height of printed text. With :data:`PRINT_MM` it is the least that :mod:`contactfpga.design.sheet.houses` print."""
+LETTER_MM = 0.8
+"""Width of a letter and the space after it, in heights."""
 
 BOARDS = {"plane": (1.6, 1.53, 4.4), "cylinder": (0.2, 0.1, 3.4)}
 """Board thickness and distance of copper layers in mm, and permittivity: of FR-4, or of a polyimide flex."""
@@ -125,13 +128,17 @@ class Drawing:
         nets: dict[str, str],
         turn: int = 0,
         back: bool = True,
+        label: tuple[float, float, bool] | None = None,
     ) -> PlacedPart:
-        """Add a part; its reference is the letter with the next number."""
+        """Add a part; its reference is the letter with the next number, printed at ``label``: the offset in x and y,
+        and whether it reads upward (:meth:`text`)."""
         self._counts[letter] = number = self._counts.get(letter, 0) + 1
         one = PlacedPart(f"{letter}{number}", part, value, rounded(place[0]), rounded(place[1]), turn, back, nets)
         self.placed.append(one)
         for x1, y1, x2, y2 in part.marks:
             self.stroke(*one.spot(x1, y1), *one.spot(x2, y2), "B" if back else "F")
+        if label:
+            self.text(one.reference, one.x + label[0], one.y + label[1], "B" if back else "F", label[2])
         return one
 
     def run(self, net: str, layer: Layer, *points: tuple[float, float], width: float = TRACK_MM) -> None:
@@ -147,30 +154,45 @@ class Drawing:
     def stroke(self, x1: float, y1: float, x2: float, y2: float, layer: Layer = "F") -> None:
         self.strokes.append(Stroke(rounded(x1), rounded(y1), rounded(x2), rounded(y2), layer))
 
-    def number(self, value: int, x: float, y: float, upright: bool = True, height: float = 0.8) -> None:
-        """Print a number on the top side, centered at (x, y); without ``upright`` it reads upward."""
-        digits = str(value)
-        step, tall = 0.8 * height, height / 2
-        corners = {0: (0, -1), 1: (1, -1), 2: (0, 0), 3: (1, 0), 4: (0, 1), 5: (1, 1)}
-        for place, digit in enumerate(digits):
-            left = (place - len(digits) / 2) * step + 0.15 * step
-            for a, b in _SEGMENTS[digit]:
-                ends = [(left + corners[k][0] * 0.6 * step, corners[k][1] * tall) for k in (a, b)]
-                if not upright:
-                    ends = [(v, -u) for u, v in ends]
-                (u1, v1), (u2, v2) = ends
-                self.stroke(x + u1, y + v1, x + u2, y + v2)
+    def text(
+        self, words: str, x: float, y: float, layer: Layer = "F", upward: bool = False, height: float = TEXT_MM
+    ) -> None:
+        """Print words centered at (x, y), as read from their side; with ``upward`` they begin at (x, y) and read
+        upward. Characters without a glyph are blank."""
+        unit, mirror = height / 4, -1 if layer == "B" else 1
+        start = 0.0 if upward else -width_mm(words, height) / 2
+        for place, letter in enumerate(words.upper()):
+            for line in _GLYPHS.get(letter, "").split("/"):
+                spots = [(int(u), int(v) - 2) for u, v in zip(line[::2], line[1::2], strict=True)]
+                along = [(start + place * LETTER_MM * height + u * unit, v * unit) for u, v in spots]
+                ends = [(mirror * v, -u) if upward else (mirror * u, v) for u, v in along]
+                for (u1, v1), (u2, v2) in itertools.pairwise(ends):
+                    self.stroke(x + u1, y + v1, x + u2, y + v2, layer)
+
+    def corner(self, x: float, y: float) -> tuple[float, float]:
+        """A place from the lower left corner of the board, y up, as files for a board house have it."""
+        return rounded(x - self.outline[0]), rounded(self.outline[3] - y)
 
     def nets(self) -> list[str]:
         found = {net for one in self.placed for net in one.nets.values()}
         return sorted(found | {track.net for track in self.tracks} | {via.net for via in self.vias})
 
 
-_SEGMENTS = {
-    digit: [((0, 1), (1, 3), (3, 5), (4, 5), (2, 4), (0, 2), (2, 3))["abcdefg".index(letter)] for letter in letters]
-    for digit, letters in zip(
-        "0123456789",
-        ["abcdef", "bc", "abdeg", "abcdg", "bcfg", "acdfg", "acdefg", "abc", "abcdefg", "abcdfg"],
-        strict=True,
+def width_mm(words: str, height: float = TEXT_MM) -> float:
+    """Width of printed words without the space after the last letter."""
+    return height * (LETTER_MM * len(words) - LETTER_MM + 0.5)
+
+
+_GLYPHS = {
+    glyph[0]: glyph[2:]
+    for glyph in re.findall(
+        r"\S+",
+        "A:0401102124/0222 B:0400102112/0212231404 C:211001031423 D:00041423211000 E:20000424/0212 F:200004/0212 "
+        "G:2110010314232212 H:0004/2024/0222 I:0020/1014/0424 J:20231403 K:0004/200224 L:000424 M:0400122024 "
+        "N:04002420 O:10010314232110 P:040010211202 Q:10010314232110/1324 R:040010211202/1224 S:21100112231403 "
+        "T:0020/1014 U:0003142320 V:001420 W:0004122420 X:0024/2004 Y:001220/1214 Z:00200424 0:10010314232110/0321 "
+        "1:011014/0424 2:0110210424 3:002012231403 4:14100323 5:20000212231403 6:2110010314231202 7:002014 "
+        "8:100112231403122110 9:0314232110011222 -:0222 +:0222/1113 _:0424 .:1314 /:0420",
     )
 }
+"""Strokes of each printed character, joined by "/": points of a grid 2 wide and 4 high, x and y of each in a digit."""

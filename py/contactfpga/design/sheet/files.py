@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import collections
-import csv
 import dataclasses
 import io
 import re
 import tomllib
-from collections.abc import Iterable
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet import gerber, kicad, picture
+from contactfpga.design.sheet import gerber, kicad, orders, picture
 from contactfpga.design.sheet.caps import Caps
 from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.layout import Layout
@@ -25,53 +25,32 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]
     """Write the files, ``skin_file`` as ``skin.toml``, and return their names; the same sheet gives the same bytes."""
     drawing, skin = layout.drawing, layout.skin
     title = f"contactfpga sheet {skin.rows}x{skin.columns} {skin.fingerprint.hex()}"
-    texts = {
-        f"{NAME}.kicad_pcb": kicad.board(drawing, title, BOARDS[skin.surface][0]),
-        f"{NAME}.kicad_pro": kicad.project(NAME),
-        f"{NAME}.net": kicad.netlist(drawing),
-        **gerber.files(drawing, NAME),
-        f"{NAME}-parts.csv": parts_list(layout),
-        f"{NAME}-placement.csv": placement_list(layout),
-        f"{NAME}-connectors.csv": connectors_list(layout),
-        f"{NAME}.svg": picture.svg(drawing, title),
-        "skin.toml": skin_file,
+    order = {**gerber.files(drawing, NAME), "fabrication.txt": orders.note(layout)}
+    contents = {
+        f"{NAME}-board.zip": packed(order),
+        f"{NAME}-bom.csv": orders.parts_list(layout).encode(),
+        f"{NAME}-cpl.csv": orders.placement_list(layout).encode(),
+        f"{NAME}-assembly.svg": picture.assembly(drawing, title).encode(),
+        f"{NAME}-connectors.csv": connectors_list(layout).encode(),
+        f"{NAME}-caps.stl": caps.stl(),
+        f"{NAME}.kicad_pcb": kicad.board(drawing, title, BOARDS[skin.surface][0]).encode(),
+        f"{NAME}.kicad_pro": kicad.project(NAME).encode(),
+        f"{NAME}.net": kicad.netlist(drawing).encode(),
+        f"{NAME}.svg": picture.svg(drawing, title).encode(),
+        "skin.toml": skin_file.encode(),
     }
-    for name, text in texts.items():
-        (folder / name).write_bytes(text.encode())
-    (folder / f"{NAME}-caps.stl").write_bytes(caps.stl())
-    return sorted([*texts, f"{NAME}-caps.stl"])
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+    return sorted(contents)
 
 
-def _table(rows: Iterable[Iterable[object]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
-
-
-def parts_list(layout: Layout) -> str:
-    kinds: dict[tuple[str, str, str], list[str]] = collections.defaultdict(list)
-    for one in layout.drawing.placed:
-        kinds[one.value, one.part.name, one.part.order].append(one.reference)
-    rows = [(len(names), value, part, " ".join(names), order) for (value, part, order), names in kinds.items()]
-    return _table([("quantity", "value", "footprint", "references", "order"), *rows])
-
-
-def placement_list(layout: Layout) -> str:
-    """The placement list as CSV, in mm from cell (row 0, column 0), y up, and rotation counterclockwise from the top
-    side."""
-    rows = [
-        (
-            one.reference,
-            one.value,
-            one.part.name,
-            f"{one.x:.4f}",
-            f"{-one.y + 0.0:.4f}",
-            one.turn,
-            "bottom" if one.back else "top",
-        )
-        for one in layout.drawing.placed
-    ]
-    return _table([("reference", "value", "footprint", "x_mm", "y_mm", "turn_deg", "side"), *rows])
+def packed(texts: Mapping[str, str]) -> bytes:
+    """A ZIP file with these texts, and the same bytes each time."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as file:
+        for name, text in texts.items():
+            file.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
+    return data.getvalue()
 
 
 def connectors_list(layout: Layout) -> str:
@@ -79,7 +58,7 @@ def connectors_list(layout: Layout) -> str:
     plugs = [one for one in layout.drawing.placed if one.reference.startswith("J")]
     ends = {line.pin: line.net for line in layout.lines}
     rows = [(one.reference, pin, net, ends.get(net, "")) for one in plugs for pin, net in one.nets.items()]
-    return _table([("connector", "pin", "wire", "line"), *rows])
+    return orders.table([("connector", "pin", "wire", "line"), *rows])
 
 
 def circuit_table(circuit: Circuit) -> str:
@@ -90,8 +69,12 @@ def circuit_table(circuit: Circuit) -> str:
     return "\n".join(lines) + "\n"
 
 
-def completed(text: str, circuit: Circuit) -> str:
-    """A Skin's file with its circuit replaced. Raises :class:`SheetError` if ``circuit`` is no table with a header."""
+def completed(text: str, circuit: Circuit, times_us: Mapping[str, float] = MappingProxyType({})) -> str:
+    """A Skin's file with its circuit and these times replaced. Raises :class:`SheetError` if ``circuit`` is no table
+    with a header, or a time is not on a line of its own."""
+    for name, us in times_us.items():
+        text, count = re.subn(rf"^(\s*{name}\s*=\s*)[\d.eE_+-]+", rf"\g<1>{us:g}", text, flags=re.MULTILINE)
+        text = text if count else f"{name} = {us:g}\n{text}"
     kept, inside = [], False
     for line in text.splitlines():
         if re.match(r"\s*\[", line):
@@ -105,8 +88,10 @@ def completed(text: str, circuit: Circuit) -> str:
         whole = {}
     before = tomllib.loads(text)
     before.pop("circuit", None)
-    if {name: value for name, value in whole.items() if name != "circuit"} != before:
+    whole.pop("circuit", None)
+    if whole != before or any(whole[name] != us for name, us in times_us.items()):
         raise SheetError(
-            "the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit]"
+            "the Skin's file has its circuit in a form that cannot be replaced; write it as a table [circuit], and "
+            "times on lines of their own"
         )
     return found

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator
 from contactfpga.design.sheet.drawing import (
     CLEARANCE_MM,
     EDGE_MM,
-    MASK_MM,
     PRINT_MM,
     TRACK_MM,
     VIA_DRILL_MM,
@@ -23,6 +22,7 @@ from contactfpga.design.sheet.drawing import (
     PlacedPart,
     rounded,
 )
+from contactfpga.design.sheet.parts import MASK_MM
 
 SPACE = uuid.UUID("6f3b7d5e-8f0c-5b0e-9b2a-2f6f6a2d7c11")
 PAGE_MM = 30.0
@@ -116,9 +116,9 @@ class _Writer:
             of = [_form("net", self.numbers[net], _text(net))] if net else []
             size = _form("size", _mm(pad.width), _mm(pad.height))
             of_layers = _form("layers", *map(_text, layers))
-            yield _form(
-                "pad", _text(pad.number), kind, shape, at, size, *drill, of_layers, *of, stamp(name, "pad", index)
-            )
+            mask = [] if one.part.mask_mm == MASK_MM else [_form("solder_mask_margin", one.part.mask_mm)]
+            words = _form("pad", _text(pad.number), kind, shape, at, size, *drill, of_layers, *of, *mask)
+            yield f"{words[:-1]} {stamp(name, 'pad', index)})"
         yield ")"
 
     def _copper(self) -> Iterator[str]:

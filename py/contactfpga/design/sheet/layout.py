@@ -10,11 +10,24 @@ from __future__ import annotations
 import dataclasses
 import math
 
+from contactfpga import __version__
 from contactfpga.boards import wiring
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import strip
-from contactfpga.design.sheet.drawing import CLEARANCE_MM, EDGE_MM, TRACK_MM, VIA_MM, Drawing, Hole
-from contactfpga.design.sheet.parts import DIODE, DIODE_VIA, SWITCHES, SheetError, SwitchPart, find_switch
+from contactfpga.design.sheet.drawing import (
+    CLEARANCE_MM,
+    EDGE_MM,
+    PRINT_MM,
+    TEXT_MM,
+    TRACK_MM,
+    VIA_MM,
+    Drawing,
+    Hole,
+    PlacedPart,
+    width_mm,
+)
+from contactfpga.design.sheet.parts import DIODE, FIDUCIAL, SWITCHES, Pad, SheetError, SwitchPart, find_switch
 from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin
 
@@ -31,8 +44,8 @@ _ROW_Y = 2.0
 _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
 """Offset of the track that brings a row to its first switch, with room for a via."""
 _ROW_START = -2.0
-_CELL_HEIGHT = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - DIODE_VIA[1] + VIA_MM / 2
 _GUARD_ROW_Y = 4.2
+_GUARD_VIA = 0.0, -0.6
 _GUARD_DIODE_X = -0.35
 _GUARD_EDGE = 0.7
 """Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
@@ -51,8 +64,20 @@ class Layout:
     """Lines from left to right, as they leave the matrix."""
 
 
-def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", margin_mm: float = MARGIN_MM) -> Layout:
-    """Lay out the sheet of a Skin with the switch ``part``. Raises :class:`SheetError` for cells finer than their parts
+_FIDUCIAL_X = 6.5
+_PRINT_GAP = 0.25
+"""From a pad to print: the mask's opening grows by 0.05 mm, and houses want 0.15 mm beside it."""
+
+
+def lay_out(
+    skin: Skin,
+    circuit: Circuit | None = None,
+    part: str = "dome",
+    margin_mm: float = MARGIN_MM,
+    board: BoardSpec | None = None,
+) -> Layout:
+    """Lay out the sheet of a Skin with the switch ``part``; with a ``board`` whose wires are all at PMOD sockets, its
+    headers have their order. Raises :class:`SheetError` for cells finer than their parts
     and for lines without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
@@ -61,16 +86,18 @@ def lay_out(skin: Skin, circuit: Circuit | None = None, part: str = "dome", marg
     drawing = Drawing()
     base = -skin.pitch_y_mm / 2 - 0.4
     matrix.draw(drawing, base)
-    left, top, right = strip.draw(drawing, skin, fitted, lines, base)
+    left, top, right = strip.draw(drawing, skin, fitted, lines, base, board)
     _outline(drawing, skin, (left, top, right), margin_mm)
-    _numbers(drawing, skin, switch)
+    _fiducials(drawing)
+    _print(drawing, skin, switch)
     return Layout(skin, fitted, switch, drawing, tuple(lines))
 
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
     """The finest pitch in mm, along x and y, at which a Skin's cells hold their parts."""
     wide = switch.part.width + CLEARANCE_MM
-    high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, _CELL_HEIGHT)
+    cell = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - switch.via[1] + VIA_MM / 2
+    high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, cell)
     if skin.columns > 1:
         wide = max(wide, 2 * switch.half_width + VIA_MM + 2 * CLEARANCE_MM, 2 * PLACE_MM)
     if skin.closed and skin.guard:
@@ -86,10 +113,14 @@ def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:
 
 def _check(skin: Skin, switch: SwitchPart) -> None:
     for name, pitch, limit in _too_fine(skin, switch):
-        others = "".join(f", or the part {part}" for part, other in SWITCHES.items() if not _too_fine(skin, other))
+        steps = [f"set {name} = {limit:.4g} or more"]
+        for part, other in SWITCHES.items():
+            still = {axis: finest for axis, _, finest in _too_fine(skin, other)}
+            if still.get(name, 0.0) < limit:
+                steps.append(f"take --part {part}" + "".join(f" and {axis} = {mm:.4g}" for axis, mm in still.items()))
         raise SheetError(
-            f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm; "
-            f"choose a larger pitch{others}"
+            f"{name} is {pitch:g}; a cell with {switch.part.name}, its diode and its tracks needs {limit:.4g} mm: "
+            f"{', or '.join(steps)}"
         )
 
 
@@ -183,30 +214,41 @@ class _Matrix:
         for tracks, name in ((column_tracks, net), (self.switch.diode, node)):
             for x1, y1, x2, y2 in tracks:
                 drawing.run(name, "F", (x + x1, y + y1), (x + x2, y + y2))
-        self._to_row(drawing, x, y, node, self.row_net(row))
+        self._to_row(drawing, (x, y), self.switch.via, node, self.row_net(row))
 
-    def _to_row(self, drawing: Drawing, x: float, y: float, node: str, row: str) -> None:
-        via = x + DIODE_VIA[0], y + DIODE_VIA[1]
+    def _to_row(
+        self, drawing: Drawing, cell: tuple[float, float], offset: tuple[float, float], node: str, row: str
+    ) -> None:
+        x, y = cell
+        via = x + offset[0], y + offset[1]
         right = x + _DIODE_AT[0] + 1.1
         drawing.via(node, *via)
         if self.skin.diodes == "none":
             drawing.run(node, "B", via, (right, via[1]), (right, y + _ROW_Y))
             return
         middle = x + _DIODE_AT[0], y + _DIODE_AT[1]
-        self._diode(drawing, middle, node, row, 180)
+        self._diode(drawing, middle, node, row, 180, (-0.3, -1.08))
         drawing.run(node, "B", via, (middle[0] - 1.1, via[1]), (middle[0] - 1.1, middle[1]))
         drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
 
-    def _diode(self, drawing: Drawing, middle: tuple[float, float], node: str, row: str, turn: int) -> None:
+    def _diode(
+        self,
+        drawing: Drawing,
+        middle: tuple[float, float],
+        node: str,
+        row: str,
+        turn: int,
+        label: tuple[float, float],
+    ) -> None:
         low = self.skin.diodes == "col2row"
         nets = {"1": row, "2": node} if low else {"1": node, "2": row}
-        drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360)
+        drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360, label=(*label, False))
 
     def _guard_cell(self, drawing: Drawing, column: int) -> None:
         x, y, net = column * self.px, self.row_y(self.skin.rows), self.column_net(column)
         end = (self.skin.rows - 1) * self.py + self.switch.reach
-        drawing.run(net, "F", (x, end), (x, y + DIODE_VIA[1]))
-        self._to_row(drawing, x, y, net, self.row_net(self.skin.rows))
+        drawing.run(net, "F", (x, end), (x, y + _GUARD_VIA[1]))
+        self._to_row(drawing, (x, y), _GUARD_VIA, net, self.row_net(self.skin.rows))
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
         x, net = self.guard_x, self.column_net(self.skin.columns)
@@ -215,7 +257,7 @@ class _Matrix:
             y, at = self.row_y(row), x + _GUARD_DIODE_X
             drawing.via(net, x, y)
             drawing.run(net, "B", (at, y - 1.1), (x, y - 1.1), (x, y))
-            self._diode(drawing, (at, y), net, self.row_net(row), 90)
+            self._diode(drawing, (at, y), net, self.row_net(row), 90, (-1.2, -2.4))
             drawing.run(self.row_net(row), "B", (at, y + 1.1), (at, y + _ROW_Y))
 
     def _row(self, drawing: Drawing, row: int, base: float) -> None:
@@ -253,9 +295,48 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
         drawing.holes += [Hole(x, y, HOLE_MM) for x in (left + inset, right - inset)]
 
 
-def _numbers(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
-    beside = (switch.half_width + skin.pitch_x_mm / 2) / 2
+def _fiducials(drawing: Drawing) -> None:
+    """Three marks beside the holes of the back, on which an assembler's machine aligns itself."""
+    a, b, c, _ = drawing.holes
+    for hole, side in ((a, 1), (b, -1), (c, 1)):
+        drawing.place("FID", FIDUCIAL, "", (hole.x + side * _FIDUCIAL_X, hole.y), {})
+
+
+def _print(drawing: Drawing, skin: Skin, switch: SwitchPart) -> None:
+    """The board's name on the back; on the front, numbers of rows and columns and, at each connector's pins, the wires'
+    names."""
+    left, top, right, _ = drawing.outline
+    name = f"{skin.rows}x{skin.columns} {skin.name[:8]} {skin.fingerprint.hex()[:8]}"
+    for line, words in enumerate((f"contactfpga {__version__}", name)):
+        drawing.text(words, (left + right) / 2, top + 2.0 + 2.0 * line, "B", height=1.2)
     for column in range(skin.columns):
-        drawing.number(column, column * skin.pitch_x_mm + 1.0, -skin.pitch_y_mm / 2 - 0.2)
-    for row in range(skin.rows):
-        drawing.number(row, -beside, row * skin.pitch_y_mm, upright=False, height=0.7)
+        drawing.text(str(column), column * skin.pitch_x_mm + 1.2, -skin.pitch_y_mm / 2 - 1.4)
+    x = _beside(skin, switch)
+    if x is not None:
+        for row in range(skin.rows):
+            drawing.text(str(row), x, row * skin.pitch_y_mm + width_mm(str(row)) / 2, upward=True)
+    for one in (one for one in drawing.placed if one.reference.startswith("J")):
+        socket = "" if one.value == one.part.name else one.value
+        drawing.text(f"{one.reference} {socket}".rstrip(), one.x, one.y - one.part.height / 2 - 1.0, "B", height=1.5)
+        drawing.text(one.reference, one.x - one.part.width / 2 + 2.2, one.y, height=1.5)
+        for pad in one.part.pads:
+            _pin_name(drawing, one, pad)
+
+
+def _beside(skin: Skin, switch: SwitchPart) -> float | None:
+    """Middle of the row numbers in x: left of the cells, or around a closed cylinder, whose edge is there, between the
+    first two columns; None without room."""
+    room = switch.half_width + _PRINT_GAP + (TEXT_MM + PRINT_MM) / 2
+    if not skin.closed:
+        return -room
+    return skin.pitch_x_mm / 2 if skin.pitch_x_mm >= 2 * room else None
+
+
+def _pin_name(drawing: Drawing, one: PlacedPart, pad: Pad) -> None:
+    net = one.nets.get(pad.number, "NC")
+    for long, short in (("columns[", "col"), ("rows[", "row"), ("column_", "c-"), ("row_", "r-"), ("_n", "")):
+        net = net.replace(long, short)
+    words = net.replace("[", "").rstrip("]")
+    x, y = one.spot(pad.x, pad.y)
+    start = pad.height / 2 + _PRINT_GAP + PRINT_MM / 2
+    drawing.text(words, x, y - start if y < one.y else y + start + width_mm(words), upward=True)

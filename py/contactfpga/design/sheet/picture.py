@@ -1,4 +1,4 @@
-"""Draws a layout as an SVG picture, as seen from the top side through the board."""
+"""Draws a layout as SVG: its picture, as seen from the top side through the board, and its assembly drawing."""
 
 from __future__ import annotations
 
@@ -6,11 +6,21 @@ import collections
 from collections.abc import Iterable, Iterator, Sequence
 
 from contactfpga import picture_style
-from contactfpga.design.sheet.drawing import PRINT_MM, VIA_DRILL_MM, VIA_MM, CopperTrack, Drawing, Layer, Stroke
+from contactfpga.design.sheet.drawing import (
+    PRINT_MM,
+    VIA_DRILL_MM,
+    VIA_MM,
+    CopperTrack,
+    Drawing,
+    Layer,
+    PlacedPart,
+    Stroke,
+)
 from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
 _BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#20262e", "#ffffff", "#6b7a8f"
+_FIRST = "#c0392b"
 
 
 def svg(drawing: Drawing, title: str) -> str:
@@ -30,13 +40,60 @@ def _lines(drawing: Drawing, title: str) -> Iterator[str]:
     yield '<g fill="none" stroke-linecap="round">'
     for layer, (color, _) in COPPER.items():
         yield from _copper(drawing, layer, color)
-    bodies = "".join(_body(one.x, one.y, one.turn, one.part.width, one.part.height) for one in drawing.placed)
+    bodies = "".join(map(_body_of, drawing.placed))
     yield f'<path stroke="{_BODY}" stroke-width="0.1" d="{bodies}"/>'
-    yield f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(drawing.strokes)}"/>'
+    yield _printed(drawing, "F")
     yield from _dots(_holes(drawing), _HOLE)
     yield "</g>"
     yield from _legend(left, bottom + 1.7 * edge, edge)
     yield "</g></svg>"
+
+
+def assembly(drawing: Drawing, title: str) -> str:
+    """The text of an SVG file that shows the back as its assembler sees it: parts with references, first pins and
+    cathodes; a user unit is a millimeter."""
+    left, top, right, bottom = drawing.outline
+    edge = (right - left) / 50
+    back = [one for one in drawing.placed if one.back and one.part.soldered]
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {right - left + 2 * edge:.2f} '
+        f'{bottom - top + 5 * edge:.2f}">',
+        f"<title>{title}, back</title>",
+        f'<path fill="#fff" d="{_box(0, 0, right - left + 2 * edge, bottom - top + 5 * edge)}"/>',
+        f'<g transform="translate({right + edge:.3f} {edge - top:.3f}) scale(-1 1)" fill="none" '
+        'stroke-linecap="round">',
+        f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>',
+        *_pads(back),
+        f'<path stroke="{_BODY}" stroke-width="0.15" d="{"".join(_body_of(one) for one in back)}"/>',
+        *_dots([(hole.drill, hole.x, hole.y) for hole in drawing.holes], _HOLE),
+        _printed(drawing, "B"),
+        "</g>",
+        *_assembly_legend(edge, bottom - top + 3 * edge, edge, back),
+        "</svg>",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _pads(placed: Sequence[PlacedPart]) -> Iterator[str]:
+    """Pads, and the first pin or cathode of each part in another color."""
+    boxes: dict[bool, list[str]] = {False: [], True: []}
+    for one in placed:
+        for pad in one.part.pads:
+            (x, y), (w, h) = one.spot(pad.x, pad.y), one.size(pad)
+            first = pad.number == "1" and bool(one.part.marks)
+            boxes[first].append(_box(x - w / 2, y - h / 2, w, h))
+    yield f'<path fill="#c9b37c" d="{"".join(boxes[False])}"/>'
+    yield f'<path fill="{_FIRST}" d="{"".join(boxes[True])}"/>'
+
+
+def _assembly_legend(x: float, y: float, size: float, placed: Sequence[PlacedPart]) -> Iterator[str]:
+    style = f'font-family="sans-serif" font-size="{0.8 * size:.2f}" fill="{_PRINT}"'
+    counts = collections.Counter((one.reference.rstrip("0123456789"), one.value) for one in placed)
+    words = ", ".join(f"{count} {letter} {value}" for (letter, value), count in counts.items())
+    said = "back, as you look at it; red: cathode of a diode, pin 1 of a chip or header", words
+    for number, line in enumerate(said):
+        yield f'<text x="{x:.2f}" y="{y + number * size:.2f}" {style}>{line}</text>'
 
 
 def _copper(drawing: Drawing, layer: Layer, color: str) -> Iterator[str]:
@@ -82,13 +139,18 @@ def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
     return "".join(words)
 
 
+def _printed(drawing: Drawing, layer: Layer) -> str:
+    strokes = [one for one in drawing.strokes if one.layer == layer]
+    return f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(strokes)}"/>'
+
+
 def _box(x: float, y: float, w: float, h: float) -> str:
     return f"M{x:.2f} {y:.2f}h{w:.2f}v{h:.2f}h{-w:.2f}z"
 
 
-def _body(x: float, y: float, turn: int, width: float, height: float) -> str:
-    w, h = (height, width) if turn % 180 else (width, height)
-    return _box(x - w / 2, y - h / 2, w, h)
+def _body_of(one: PlacedPart) -> str:
+    w, h = (one.part.height, one.part.width) if one.turn % 180 else (one.part.width, one.part.height)
+    return _box(one.x - w / 2, one.y - h / 2, w, h)
 
 
 def _legend(left: float, y: float, size: float) -> Iterator[str]:

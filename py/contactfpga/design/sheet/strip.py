@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from contactfpga.boards import spec, wiring
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import channel
 from contactfpga.design.sheet.channel import GRID_MM, Grid, Pin
@@ -26,6 +27,11 @@ LINES_A_GROUND = 4
 """Number of neighboring cable wires that share a ground."""
 ENABLE_OHM = 10_000
 """Resistor that disables the 74HC595 while the FPGA is configured (docs/boards.md)."""
+
+
+_LABELS = {"U": (0.0, -4.35, False), "C": (0.0, -2.1, False), "R": (0.0, -2.1, False)}
+"""Offsets of the printed references of the strip's chips and their parts; a connector has its name on both sides."""
+_LINE_LABEL = 0.0, -1.5, True
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +60,8 @@ class _Unit:
     nets: dict[str, str]
 
     def place(self, drawing: Drawing, y: float) -> list[Pin]:
-        one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn)
+        label = _LABELS.get(self.letter)
+        one = drawing.place(self.letter, self.part, self.value, (self.x, y), self.nets, self.turn, label=label)
         return [
             Pin(self.nets[pad.number], *one.spot(pad.x, pad.y)) for pad in self.part.pads if pad.number in self.nets
         ]
@@ -65,14 +72,17 @@ def port(name: str, bit: int, bits: int) -> str:
     return name if bits == 1 else f"{name}[{bit}]"
 
 
-def draw(drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], base: float) -> tuple[float, ...]:
-    """Draw the strip above ``base``; returns its left, top and right end in mm."""
+def draw(
+    drawing: Drawing, skin: Skin, circuit: Circuit, lines: Sequence[Line], base: float, board: BoardSpec | None
+) -> tuple[float, ...]:
+    """Draw the strip above ``base``, with connectors for a board's PMOD sockets if it has all wires there; returns its
+    left, top and right end in mm."""
     grid = Grid(max(line.x for line in lines))  # so that nothing steps nearer to the edge than the last line
     below = [pin for line in lines for pin in _line(drawing, circuit, line, base, grid)]
     bottom = base - 4.6
     middle = (min(line.x for line in lines) + max(line.x for line in lines)) / 2
     chips = _chips(skin, middle, grid)
-    plugs = _connectors(skin, middle, grid, below=bool(chips))
+    plugs = _connectors(_for_pmods(skin, board) or _of_lines(skin), middle, grid, below=bool(chips))
     ends = [pin.x - VIA_MM / 2 for pin in below] + [max(line.x for line in lines) + _PAD]
     if chips:
         below, bottom, passed = _registers(drawing, chips, plugs, below, bottom)
@@ -92,14 +102,14 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
         drawing.via(line.net, x, base)
         drawing.run(line.net, "B", (x, base), (x, middle + 0.8))
     ohms = f"{circuit.series_ohm:g}"
-    drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90)
+    drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90, label=_LINE_LABEL)
     yield _stepped(drawing, line.pin, x, middle - 0.8, grid)
     if line.pull:
         x -= _BESIDE
         drawing.run(line.net, "B", (line.x, middle + 0.8), (x, middle + 0.8))
         ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
         rail = SUPPLY if line.pull == "up" else GND
-        drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90)
+        drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90, label=_LINE_LABEL)
         yield _stepped(drawing, rail, x, middle - 0.8, grid)
 
 
@@ -127,7 +137,25 @@ def _plug(drawing: Drawing, unit: _Unit, y: float) -> Iterator[Pin]:
             yield Pin(pin.net, pin.x + GRID_MM, y)
 
 
-def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Unit]:
+_PMOD_RAILS = {"5": GND, "11": GND, "6": SUPPLY, "12": SUPPLY}
+"""Pins of Digilent's PMOD interface beside its signals."""
+
+
+def _for_pmods(skin: Skin, board: BoardSpec | None) -> dict[str, list[str]]:
+    """Nets of a header for each PMOD socket, so that straight flat cables join both, and of one for the outputs."""
+    found: dict[str, list[str]] = {}
+    if board is None:
+        return found
+    for connector, wires in board.pmods(skin).items():
+        nets = wires | _PMOD_RAILS
+        # a flat cable alternates between the rows of a header: pins 1 to 6 of the socket, and 7 to 12
+        found[board.connectors[connector]] = [nets.get(str(k // 2 + 1 + k % 2 * 6), "") for k in range(12)]
+    if found:
+        found["OUTPUT"] = ["contact", GND, "alive" if skin.alive else "", GND, SUPPLY, GND]
+    return found
+
+
+def _of_lines(skin: Skin) -> dict[str, list[str]]:
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -135,14 +163,18 @@ def _connectors(skin: Skin, middle: float, grid: Grid, below: bool) -> list[_Uni
         count = -(-len(ports) // most)
         share = -(-len(ports) // count)
         found += [_with_grounds(ports[first : first + share]) for first in range(0, len(ports), share)]
-    parts = [header(len(nets)) for nets in found]
+    return {f"{index}": nets for index, nets in enumerate(found)}
+
+
+def _connectors(found: Mapping[str, list[str]], middle: float, grid: Grid, below: bool) -> list[_Unit]:
+    parts = [header(len(nets)) for nets in found.values()]
     left = middle - sum(part.width + GRID_MM for part in parts) / 2
     units = []
-    for part, nets in zip(parts, found, strict=True):
+    for part, (name, nets) in zip(parts, found.items(), strict=True):
         x = grid.near(left + part.width / 2, below)
         left += part.width + GRID_MM
-        named = {str(pin + 1): net for pin, net in enumerate(nets)}
-        units.append(_Unit("J", part, part.name, x, 180, named))
+        named = {str(pin + 1): net for pin, net in enumerate(nets) if net}
+        units.append(_Unit("J", part, part.name if name.isdigit() else name, x, 180, named))
     return units
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from contactfpga import terminal
 from contactfpga.design import kits
-from contactfpga.design.circuit import load_checked
+from contactfpga.design.circuit import Circuit, load_checked, needed_by, recommended_us
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawing import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
@@ -29,6 +29,7 @@ def add_flags(flag: flags.Flags) -> None:
     flags.output_folder(flag, "build/sheet")
     part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
     flag("--part", part, tuple(SWITCHES), "dome")
+    flag("--board BOARD", "Board whose PMOD sockets the headers are for; a kit has its own.")
     flag("--edge-mm MM", "Board beyond the parts, in mm.", numbers.number(MARGIN_MM, 100, "mm"), MARGIN_MM)
     flag("--cable M", "Length of the ribbon cables, in m.", numbers.number(0, 10, "m"), 0.3)
     flag("--kicad", "Have KiCad 6 check the board; status 1 if it finds anything.")
@@ -37,7 +38,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns 1 if KiCad was run and found something."""
-    from contactfpga.design.sheet import check, files
+    from contactfpga.design.sheet import check, files, houses
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted
 
@@ -46,18 +47,26 @@ def run(args: argparse.Namespace) -> int:
         raise ContactFPGAError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")
     skin = Skin.load(file)
     cover, circuit = load_cover(file), load_checked(file, skin)
-    layout = lay_out(skin, circuit, args.part, args.edge_mm)
+    layout = lay_out(skin, circuit, args.part, args.edge_mm, flags.board(args))
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
     layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
-    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit)
+    times = _times(skin, found.circuit)
+    longer = {name: us for name, us in times.items() if us is not None}
+    text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit, longer)
+    if args.kicad:
+        check.require()
     names = files.write(folder, layout, layer, text)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
+    by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
+    large = "" if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
     answer: dict[str, Any] = {
         "folder": str(folder),
         "files": names,
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
-        "parts": collections.Counter(one.part.name for one in layout.drawing.placed),
+        "note": large,
+        "by_hand": collections.Counter(by_hand),
+        "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
         "caps": {
             "count": len(layer.centers),
             "side_mm": round(layer.side_mm, 6),
@@ -68,11 +77,20 @@ def run(args: argparse.Namespace) -> int:
         "circuit": {
             name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
         },
+        "times": {name: {"given": getattr(skin, name), "needed": us} for name, us in times.items()},
         "extracted": {name: value for name, value in dataclasses.asdict(found).items() if name != "circuit"},
         "kicad": problems,
     }
     results.show(args, answer, lambda: _show(answer, skin))
     return 1 if problems else 0
+
+
+def _times(skin: Skin, circuit: Circuit) -> dict[str, float | None]:
+    """Times of the Skin that are too short for the sheet's circuit, with what it needs; None if no time suffices."""
+    if skin.diodes == "none":
+        return {}  # not in the model
+    wanted = recommended_us(skin, needed_by(skin, circuit))
+    return {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
 
 
 def _show(answer: dict[str, Any], skin: Skin) -> None:
@@ -83,7 +101,11 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
         f"{VIA_MM}/{VIA_DRILL_MM} mm",
         hang=2,
     )
+    if answer["note"]:
+        terminal.say(f"note: {answer['note']}", hang=2)
     terminal.say("parts: " + ", ".join(f"{count} {name}" for name, count in answer["parts"].items()), hang=2)
+    for words, count in answer["by_hand"].items():
+        terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
     cap = answer["caps"]
     terminal.say(
         f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
@@ -104,6 +126,10 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     )
     for name, value in answer["circuit"].items():
         terminal.say(f"  {name} = {value:g}")
+    for name, one in answer["times"].items():
+        never = "no time is enough for this circuit, and the next command says why"
+        words = never if one["needed"] is None else f"this circuit needs {one['needed']:g}, and skin.toml has it"
+        terminal.say(f"{name} was {one['given']:g}; {words}", hang=2)
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, load_circuit, needed_by
+from contactfpga.design.circuit import Circuit, needed_by
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel, spread_evenly
@@ -28,7 +28,6 @@ from contactfpga.design.cover.patch import Ellipse, Rectangle
 from contactfpga.design.cover.press import Cover
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
-from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
@@ -219,8 +218,7 @@ PROJECTED = {
 
 
 def _circuit(kit: Kit) -> Iterator[Prediction]:
-    skin, stated = kit.skin, load_circuit(kit.skin_path)
-    nominal = extracted(lay_out(skin, stated)).circuit
+    skin, nominal = kit.skin, extracted(kit.layout).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
     needs = [needed_by(skin, one) for one in drawn]

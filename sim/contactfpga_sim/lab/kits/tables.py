@@ -11,10 +11,8 @@ from typing import NamedTuple
 
 from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
-from contactfpga.design.sheet import lay_out
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, pnr_report
 from contactfpga_sim.apps import covers, pool
@@ -184,10 +182,13 @@ def parts_table() -> writer.Table:
     rows = []
     for name in NAMES:
         kit = kits.kit(name)
-        layout = lay_out(kit.skin, load_circuit(kit.skin_path))
-        counted = collections.Counter((one.part.order, one.value) for one in layout.drawing.placed)
-        for (order, value), count in counted.items():
-            shown = ohms(float(value)) if value.isdigit() else ""
+        counted: collections.Counter[tuple[str, ...]] = collections.Counter()
+        for one in kit.layout.drawing.placed:
+            if one.value:  # a fiducial is copper
+                ohm = ohms(float(one.value)) if one.value.isdigit() else ""
+                article = " ".join(filter(None, (one.part.article[0], one.part.number(one.value))))
+                counted[one.part.order, ", ".join(filter(None, (ohm, article)))] += 1
+        for (order, shown), count in counted.items():
             rows.append((name, "sheet", str(count), order, shown))
         for other in kit.parts:
             maker = " ".join(filter(None, (other.maker, other.number)))

@@ -16,7 +16,6 @@ from contactfpga.design.circuit.fit import PROBABILITY
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.fitted import FittedForce, fit_force
 from contactfpga.design.kits import Kit
-from contactfpga.design.sheet import lay_out
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
@@ -192,7 +191,7 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
     from contactfpga_sim.model.scenes.hand import Hand
 
     hand = Hand(skin.rows, skin.columns)
-    circuit = extracted(lay_out(kit.skin, load_circuit(kit.skin_path))).circuit
+    circuit = extracted(kit.layout).circuit
     return _Hand(hand), VirtualBoard(skin, hand, circuit=circuit)
 
 
