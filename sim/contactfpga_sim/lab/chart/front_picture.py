@@ -75,7 +75,7 @@ ROWS = {
         "D",
         {f"{pitch} mm": f"run, {pitch} mm, paper" for pitch in ("10", "6.4")},
         (-8, 0),
-        {("10 mm", "miscounted"): (-8, -13), ("10 mm", "barycenter_mm"): (-8, 10)},
+        {("10 mm", "miscounted"): (-8, -13), ("10 mm", "barycenter_mm"): (6, 11)},
     ),
     "no cover: a limit that nobody can build": Row(
         style.GRAY, "v", {f"{pitch} mm": f"run, {pitch} mm, bare" for pitch in ("10", "6.4")}
