@@ -29,7 +29,7 @@ def add_flags(flag: flags.Flags) -> None:
     flags.output_folder(flag, "build/sheet")
     part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
     flag("--part", part, tuple(SWITCHES), "dome")
-    flag("--board BOARD", "Board whose PMOD sockets the headers are for; a kit has its own.")
+    flag("--board NAME", "Board whose PMOD sockets the headers are for; a kit has its own.")
     flag("--edge-mm MM", "Board beyond the parts, in mm.", numbers.number(MARGIN_MM, 100, "mm"), MARGIN_MM)
     flag("--cable M", "Length of the ribbon cables, in m.", numbers.number(0, 10, "m"), 0.3)
     flag("--kicad", "Have KiCad 6 check the board; status 1 if it finds anything.")
