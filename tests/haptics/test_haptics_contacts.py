@@ -95,7 +95,7 @@ def test_two_forces_have_the_smallest_parts_along_the_surface(seed):
 @given(SEEDS)
 @settings(max_examples=15, deadline=None)
 def test_forces_of_many_are_those_of_clarabel(kind, seed):
-    """Within friction's cones, with the smallest parts along the surface; or there are none.
+    """Both find forces within friction's cones that have the smallest parts along the surface, or both find none.
 
     Clarabel has the places from their middle, in units of their spread, which turns moments but no force.
     """
@@ -122,8 +122,9 @@ def test_forces_of_many_are_those_of_clarabel(kind, seed):
 @given(seed=SEEDS)
 @settings(max_examples=40, deadline=None)
 def test_misfits_are_those_of_least_squares(friction, seed):
-    """Of pushes, whatever the wrench. With friction and a contact unseen, of any forces within friction; beyond it, at
-    most that of forces in pyramids of friction 10, and what is not significant."""
+    """Without friction the misfit is that of pushes, whatever the wrench. With friction, and with a contact left out,
+    it is that of any forces within friction. Beyond friction it is not significant, and at most that of forces in
+    pyramids of friction 10."""
     rng = np.random.default_rng(seed)
     points, normals = scattered(rng, int(rng.integers(2, 7)))
     noise = random_bumper(rng).noise

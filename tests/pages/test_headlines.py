@@ -65,6 +65,14 @@ def test_times_are_those_of_the_kits_page_worst_first(index, name):
     assert against.startswith(("6,000 µs for the paper's", "up to 1,000 µs", "the same"))
 
 
+def test_the_table_of_assumptions_starts_from_the_headlines():
+    """Its mean peaks are of 16 touches, those of the README of many more: both are within 5 % of each other."""
+    said = re.search(r"mean peak force, rigid (.*?) N; the same, forearm (.*?) N", (ROOT / "docs/kits.md").read_text())
+    for body, value in zip(("rigid", "forearm"), said.groups(), strict=True):
+        _, mean = peaks("starter", body)["UART"].split(" / ")
+        assert float(value) == pytest.approx(float(mean), rel=0.05)
+
+
 def test_counts_are_those_of_their_page():
     fingers, page = headlines()[3], (ROOT / "docs" / "kits.md").read_text()
     (row,) = re.findall(r"^\| two to five fingers of 2 to 20 N \| (.*) \|$", page, re.MULTILINE)

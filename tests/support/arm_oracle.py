@@ -55,7 +55,10 @@ class Layers:
 
 
 def paper_set(force_to_close=4.1556, latency=6e-3, force=hertz, end=28e-3):
-    """The same experiment by an adaptive integrator from one controller sample to the next; ``force`` over depth."""
+    """The paper's set of an arm that runs into a bar, by an adaptive integrator from one controller sample to the next.
+
+    ``force``: the force in N at a depth in m.
+    """
     inertia, arm, lever, period = 0.0157166 + 50**2 * 6e-6, 0.0157166, 0.2, 0.25e-3
     come, per_amp, emf = 0.23 / lever, 50 * 0.05, 50 * 0.05
 

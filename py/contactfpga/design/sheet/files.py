@@ -70,8 +70,11 @@ def circuit_table(circuit: Circuit) -> str:
 
 
 def completed(text: str, circuit: Circuit, times_us: Mapping[str, float] = MappingProxyType({})) -> str:
-    """A Skin's file with its circuit and these times replaced. Raises :class:`SheetError` if ``circuit`` is no table
-    with a header, or a time is not on a line of its own."""
+    """The text of a Skin's file in which the circuit and these times are replaced.
+
+    Raises :class:`SheetError` if the file has its circuit not as a table with a header, or a time not on a line of its
+    own.
+    """
     for name, us in times_us.items():
         text, count = re.subn(rf"^(\s*{name}\s*=\s*)[\d.eE_+-]+", rf"\g<1>{us:g}", text, flags=re.MULTILINE)
         text = text if count else f"{name} = {us:g}\n{text}"

@@ -1,4 +1,4 @@
-"""What two board houses make of a rigid board with two layers, as their pages say; others differ little."""
+"""Limits of two board houses for a rigid board with two layers, read in November 2026 from copies of their pages."""
 
 from __future__ import annotations
 

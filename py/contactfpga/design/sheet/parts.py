@@ -187,8 +187,16 @@ RESISTOR = Part("R_0603", "resistor, 0603, 1 %", _pair(0.8, 0.8, 0.8), 2.7, 1.3,
 CAPACITOR = Part(
     "C_0603", "capacitor, 0603, X7R, 50 V", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "CC0603KRX7R9BB104")
 )
-FIDUCIAL = Part("FIDUCIAL", "mark for an assembler's camera", (Pad("1", 0.0, 0.0, 1.0, 1.0, round=True),), 3.0, 3.0,
-                pasted=False, soldered=False, mask_mm=0.5)  # fmt: skip
+FIDUCIAL = Part(
+    "FIDUCIAL",
+    "mark for an assembler's camera",
+    (Pad("1", 0.0, 0.0, 1.0, 1.0, round=True),),
+    3.0,
+    3.0,
+    pasted=False,
+    soldered=False,
+    mask_mm=0.5,
+)
 
 
 def _soic16(name: str) -> Part:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from contactfpga.boards import spec, wiring
 from contactfpga.boards.spec import BoardSpec
@@ -141,21 +141,23 @@ _PMOD_RAILS = {"5": GND, "11": GND, "6": SUPPLY, "12": SUPPLY}
 """Pins of Digilent's PMOD interface beside its signals."""
 
 
-def _for_pmods(skin: Skin, board: BoardSpec | None) -> dict[str, list[str]]:
-    """Nets of a header for each PMOD socket, so that straight flat cables join both, and of one for the outputs."""
-    found: dict[str, list[str]] = {}
+def _for_pmods(skin: Skin, board: BoardSpec | None) -> list[tuple[str, list[str]]]:
+    """Name and nets of a header for each PMOD socket, so that straight flat cables join both, and of one for the
+    outputs."""
+    found: list[tuple[str, list[str]]] = []
     if board is None:
         return found
     for connector, wires in board.pmods(skin).items():
         nets = wires | _PMOD_RAILS
         # a flat cable alternates between the rows of a header: pins 1 to 6 of the socket, and 7 to 12
-        found[board.connectors[connector]] = [nets.get(str(k // 2 + 1 + k % 2 * 6), "") for k in range(12)]
+        found.append((board.connectors[connector], [nets.get(str(k // 2 + 1 + k % 2 * 6), "") for k in range(12)]))
     if found:
-        found["OUTPUT"] = ["contact", GND, "alive" if skin.alive else "", GND, SUPPLY, GND]
+        found.append(("OUTPUT", ["contact", GND, "alive" if skin.alive else "", GND, SUPPLY, GND]))
     return found
 
 
-def _of_lines(skin: Skin) -> dict[str, list[str]]:
+def _of_lines(skin: Skin) -> list[tuple[str, list[str]]]:
+    """Nets of headers without a name, in the order of the lines."""
     found = []
     for wires in (spec.row_wires(skin), spec.column_wires(skin)):
         ports = [port(name, bit, bits) for name, bits in wires.items() for bit in range(bits)]
@@ -163,18 +165,18 @@ def _of_lines(skin: Skin) -> dict[str, list[str]]:
         count = -(-len(ports) // most)
         share = -(-len(ports) // count)
         found += [_with_grounds(ports[first : first + share]) for first in range(0, len(ports), share)]
-    return {f"{index}": nets for index, nets in enumerate(found)}
+    return [("", nets) for nets in found]
 
 
-def _connectors(found: Mapping[str, list[str]], middle: float, grid: Grid, below: bool) -> list[_Unit]:
-    parts = [header(len(nets)) for nets in found.values()]
+def _connectors(found: Sequence[tuple[str, list[str]]], middle: float, grid: Grid, below: bool) -> list[_Unit]:
+    parts = [header(len(nets)) for _, nets in found]
     left = middle - sum(part.width + GRID_MM for part in parts) / 2
     units = []
-    for part, (name, nets) in zip(parts, found.items(), strict=True):
+    for part, (name, nets) in zip(parts, found, strict=True):
         x = grid.near(left + part.width / 2, below)
         left += part.width + GRID_MM
         named = {str(pin + 1): net for pin, net in enumerate(nets) if net}
-        units.append(_Unit("J", part, part.name if name.isdigit() else name, x, 180, named))
+        units.append(_Unit("J", part, name or part.name, x, 180, named))
     return units
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -13,8 +14,12 @@ from contactfpga.design import kits
 from contactfpga.design.cover import Body, Cover, load_cover
 from contactfpga.design.cover.numerics import Floats
 from contactfpga_sim.apps import errors, pool
+from contactfpga_sim.apps.latency import stages
+from contactfpga_sim.apps.latency.usb import BridgeSettings
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.arm import kits as kits_arm
 from contactfpga_sim.lab.arm import places
+from contactfpga_sim.lab.arm.anywhere import WAYS
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.kits import predict
 from contactfpga_sim.model.scenes.families import placements
@@ -58,12 +63,19 @@ def headlines(changes: Mapping[str, float], touches: int = TOUCHES, scenes: int 
     assert stated is not None
     one = predict.pressing(stated, of)
     found = predict.measured(one, KIT.skin, 0)
-    latencies = tuple(late_s + each for each in places.measured_s(Case.load("paper"), KIT.skin, "uart"))
+    latencies = tuple(late_s + each for each in _usual_s())
     rigid_n, forearm_n = (_peak_n(one.cover, body, of["patch"], latencies, touches) for body in ("rigid", "forearm"))
     told_ms = found["first_closing_ms"] + 1e3 * float(np.median(latencies))
     wide = one.body._replace(depth_m=one.body.depth_m / of["patch"] ** 2)  # the same curvature as of a wider patch
     wrong = np.fromiter(_miscounted(one.cover, wide, scenes), float)
     return Headlines(found["felt_half_n"], told_ms, rigid_n, forearm_n, wrong)
+
+
+@functools.cache
+def _usual_s() -> places.Latencies:
+    """The kit's own times in s from a closed switch to the controller's input, by UART and USB."""
+    finger = stages.measure(KIT.skin, BridgeSettings(KIT.board.bridge), host_touches=0)
+    return kits_arm.ways(KIT, finger)[WAYS.index("UART")]
 
 
 def _peak_n(cover: Cover, body: str, wide: float, latencies: places.Latencies, touches: int) -> float:

@@ -35,9 +35,9 @@ PEAKS = {
     "6 ms": "if the stop comes 6 ms late",
     "limit alone": "if no stop comes and only the limit of torque holds",
 }
-"""What a row of the README says of each of :data:`contactfpga_sim.lab.arm.anywhere.WAYS`."""
+"""Words of the README's row for each of :data:`contactfpga_sim.lab.arm.anywhere.WAYS`."""
 BODIES = ("forearm", "rigid")
-"""Ends of what the arm may run into, which nobody knows better."""
+"""The softest and the stiffest body that the arm may run into."""
 
 
 class KitFigures(NamedTuple):
@@ -109,7 +109,7 @@ def _shown(one: KitFigures) -> tuple[str, str, str]:
 
 
 def _rates(scenes: Drawn, *beside: tuple[Skin, Cover]) -> list[Rate]:
-    """Of both kits, and of sheets beside them."""
+    """Miscounted scenes of both kits, and of the sheets in ``beside``."""
     sheets = [(kit.skin, load_cover(kit.skin_path)) for kit in map(kits.kit, NAMES)]
     with pool.executor() as workers:
         return [counts.miscounted(*sheet, scenes, workers) for sheet in (*sheets, *beside)]

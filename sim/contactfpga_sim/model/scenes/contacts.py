@@ -116,7 +116,7 @@ class Contact:
             shape = PressedParts(indentation, full_m)
             return dataclasses.replace(self, body=None, shape=shape if callable(full_m) else shape(0.0))
         if callable(full_m):
-            raise ValueError("the contact has a force of its own over time; it cannot approach as well")
+            raise ValueError("the contact has speed_mm_s and a force over time; leave one of them out")
         depth_m = Approach(full_m, self.speed_mm_s * M)
         force = PressedForce(indentation, depth_m, at(self.force_n, 0.0) / max(indentation.force_n(full_m), 1e-300))
         return dataclasses.replace(self, body=None, shape=PressedParts(indentation, depth_m), force_n=force)
