@@ -210,7 +210,7 @@ class Link(wiring.Component):
         last = len(closing) - 1
         tail = Signal(range(len(closing)))
         ends = Signal()  # the packet, with this byte
-        ended = Signal()  # a packet, in the clock before
+        ended = Signal()  # a packet, and its delimiter was not repeated
         goes = hello, frame, either = hello_due, regions.waits & ~hello_due, hello_due | regions.waits
         if self.place is not None:
             hello, frame, either = (one & self.grant for one in goes)
@@ -232,12 +232,12 @@ class Link(wiring.Component):
                     end.eq(Mux(hello_due, len(self._hello), regions.waiting_end)),
                     wire.offset.eq(0),
                 ]
-                if self._rests:
-                    m.d.sync += [ended.eq(0), tail.eq(last)]
-                    with m.If(ended):
-                        m.next = "TAIL"
                 with m.If(either):
                     m.next = "FETCH"
+                if self._rests:
+                    with m.Elif(ended):
+                        m.d.sync += [ended.eq(0), tail.eq(last)]
+                        m.next = "TAIL"
                 for other in others:
                     with m.If(other.choose(m, hello_due, regions.waits)):
                         m.d.comb += wire.take_frame.eq(0)
