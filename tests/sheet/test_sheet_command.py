@@ -18,7 +18,7 @@ from contactfpga.tools import cli
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 ALL = {
     *("sheet-board.zip", "sheet-bom.csv", "sheet-cpl.csv", "sheet-assembly.svg", "sheet-connectors.csv"),
-    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.net", "sheet.svg", "sheet-caps.stl", "skin.toml"),
+    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.net", "sheet.svg", "sheet-caps.stl", "sheet-frame.stl", "skin.toml"),
 }
 
 

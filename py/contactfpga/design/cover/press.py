@@ -97,6 +97,11 @@ class Bed:
         positive("area_m2", self.area_m2, "m2")
         positive("mass_kg", self.mass_kg, "kg")
 
+    @property
+    def pad_mm(self) -> float:
+        """Side of each of four square pads."""
+        return 1e3 * math.sqrt(self.area_m2 / 4)
+
     def force_n(self, sunk_m: float, modulus_pa: float) -> float:
         """Force of pads with p = E e/(1 - e), below 0 if they are pulled."""
         strain = sunk_m / self.thickness_m
