@@ -129,6 +129,7 @@ _ALL = (
             beds=Section("beds:beds_table"),
         ),
         compute="tables:compute",
+        pictures="steps:draw",
         extra="chart",
     ),
     Study(
