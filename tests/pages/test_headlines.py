@@ -92,6 +92,15 @@ def test_forces_are_those_of_each_kit_on_a_soft_and_a_rigid_body():
         assert cells[2] == f"{paper[0]} N forearm, {paper[1]} N rigid with the paper's sheet"
 
 
+@pytest.mark.parametrize("sheet", ["starter", "fast"])
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("way", ["6 ms", "limit alone"])
+def test_a_late_stop_or_none_costs_no_more_than_under_the_papers_sheet(sheet, body, way):
+    """Worst and mean alike, in the rows of one table."""
+    ours, theirs = (list(map(float, peaks(one, body)[way].split(" / "))) for one in (sheet, "paper"))
+    assert all(mine <= paper for mine, paper in zip(ours, theirs, strict=True))
+
+
 @pytest.mark.parametrize("page", ["kits.md", "safety.md"])
 def test_pages_say_what_a_late_stop_costs_with_the_starter_kit(page):
     text = " ".join((ROOT / "docs" / page).read_text().split())
