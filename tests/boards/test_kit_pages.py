@@ -219,7 +219,7 @@ def test_size_mass_and_height_of_a_kit_are_those_of_its_files(name, column):
     assert square == f"{sum(grams) / side_mm**2 * 1e3:.1f} kg"
     assert 1e3 * cover.bed.mass_kg == pytest.approx(sum(grams), rel=0.1)
     below, above = (
-        10 + np.ptp(prints[2].bounds[:, 2]) + bed_mm,
+        5 + np.ptp(prints[2].bounds[:, 2]) + bed_mm,
         kit.layout.switch.height_mm + np.ptp(prints[0].bounds[:, 2]),
     )
     assert height == f"{below + 1.6 + above + foam_mm:.1f} mm"

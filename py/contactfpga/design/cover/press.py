@@ -252,7 +252,7 @@ def read_cover(values: Any) -> Cover:
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     for name, kind in (("switch", Switch), ("cap", Cap), ("bed", Bed)):
         if name in given:
-            given[name] = kind(**tomlfile.fields_of(kind, f"cover.{name}", given[name], CoverError))
+            given[name] = _part(kind, name, given[name])
     cover = Cover(**given)
     lengths = [("thickness_m", cover.thickness_m)]
     lengths += [("side_m", cover.cap.side_m)] if cover.cap else []
@@ -267,6 +267,15 @@ def read_cover(values: Any) -> Cover:
         if not 1e-9 <= value <= 1e6:
             raise CoverError(f"{name} in [cover.switch] is {value:g}; it must lie between 1e-09 and 1e+06 {unit}")
     return cover
+
+
+def _part(kind: type, name: str, values: Any) -> Any:
+    """The part ``[cover.NAME]``, all of whose fields without a default are there."""
+    given = tomlfile.fields_of(kind, f"cover.{name}", values, CoverError)
+    for field in dataclasses.fields(kind):
+        if field.default is dataclasses.MISSING and field.name not in given:
+            raise CoverError(f"{field.name} is missing in [cover.{name}]")
+    return kind(**given)
 
 
 def write_cover(cover: Cover) -> str:

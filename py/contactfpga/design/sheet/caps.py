@@ -21,12 +21,12 @@ LEAST_GAP_MM = 0.3
 """Least gap for a printer with lines of 0.4 mm."""
 BELOW_MM = 0.3
 """Gap below the plate at a fully pressed switch, for tilt."""
-STEM_MM = 2.5
-GUIDE_MM = 4.0
+STEM_MM = 2.0
+GUIDE_MM = 6.0
 """Height of the frame's tubes."""
-PLAY_MM = 0.1
+PLAY_MM = 0.05
 """Gap around a stem in its tube."""
-WALL_MM = 0.8
+WALL_MM = 0.6
 """Thickness of the frame's tubes, ribs and posts."""
 RIB_MM = 1.5
 """Height of the frame's ribs."""

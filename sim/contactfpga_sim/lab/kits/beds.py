@@ -64,9 +64,9 @@ CHOICES = (
     Choice(4),
     Choice(6),
     Choice(2, 10),
-    Choice(2, 10, stiff=0.7),
-    Choice(2, 10, stiff=1.3),
     Choice(2, 20),
+    Choice(2, 20, stiff=0.7),
+    Choice(2, 20, stiff=1.3),
     Choice(3, 10),
 )
 HEAD = (

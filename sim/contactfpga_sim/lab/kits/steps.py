@@ -17,7 +17,7 @@ from contactfpga.inputs.files import write_text
 KIT = kits.kit("starter")
 PX = 14.0
 """Pixels of a millimeter."""
-SPACER_MM, HEADER_MM, PLUG_MM = 10.0, 9.0, 15.0
+SPACER_MM, HEADER_MM, PLUG_MM = 5.0, 9.0, 15.0
 """Length of a spacer, and height of a header without and with its plug."""
 CELLS = 2
 LEFT_MM, WORDS_MM, WIDE_MM = 4.0, 28.0, 52.0
