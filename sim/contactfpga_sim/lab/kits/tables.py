@@ -189,7 +189,8 @@ def parts_table() -> writer.Table:
             maker = " ".join(filter(None, (other.maker, other.number)))
             rows.append((name, "beside it", str(other.count), other.what, maker))
     head = ("kit", "where", "count", "what", "value or maker's number")
-    return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
+    others = {row[2:] for row in rows if row[0] == NAMES[0]}
+    return writer.Table(head, rows, lambda row: row[1] == "beside it" and row[2:] not in others, head[2:])
 
 
 PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
