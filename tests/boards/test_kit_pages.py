@@ -2,6 +2,7 @@
 
 import dataclasses
 import datetime
+import io
 import random
 import re
 import tomllib
@@ -20,7 +21,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import KitError
 from contactfpga.design.predictions import Prediction
 from contactfpga.design.sheet import orders
-from contactfpga.design.sheet.caps import caps
+from contactfpga.design.sheet.caps import caps, feet, stl
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps.latency import board as latency
 from contactfpga_sim.lab.arm import kits as kits_arm
@@ -191,8 +192,8 @@ def test_the_tutorial_lists_the_parts_of_the_starter_kit():
 
 
 @pytest.mark.parametrize(("name", "column"), [("starter", 1), ("fast", 2)])
-def test_size_mass_and_height_of_a_kit_are_those_of_its_files(tmp_path, name, column):
-    """Caps are measured by trimesh, the board's outline by its file's corners."""
+def test_size_mass_and_height_of_a_kit_are_those_of_its_files(name, column):
+    """Printed parts are measured by trimesh, the board's outline by its file's corners; the bed carries this mass."""
     kit, page = kits.kit(name), Path("docs/kits.md").read_text(encoding="utf-8")
     rows = [
         line.split("|")[1:-1] for line in page.splitlines() if re.match(r"\| (board of the|height|mass|the same)", line)
@@ -202,14 +203,26 @@ def test_size_mass_and_height_of_a_kit_are_those_of_its_files(tmp_path, name, co
     width, length = map(float, found.groups())
     cover = load_cover(kit.skin_path)
     layer = caps(kit.skin, kit.layout.switch, 1e3 * cover.cap.side_m)
-    (tmp_path / "caps.stl").write_bytes(layer.stl())
-    mesh, foam_mm = trimesh.load(tmp_path / "caps.stl"), 1e3 * cover.thickness_m
-    side_mm = kit.skin.columns * kit.skin.pitch_x_mm
-    grams = [width * length * 1.6 * 1.85e-3, mesh.volume * 1.01e-3, side_mm**2 * foam_mm * 33e-6]
+    prints = [
+        trimesh.load(io.BytesIO(stl(body)), file_type="stl")
+        for body in (layer.caps(), layer.frame(), feet(cover.bed.pad_mm))
+    ]
+    foam_mm, bed_mm, side_mm = (
+        1e3 * cover.thickness_m,
+        1e3 * cover.bed.thickness_m,
+        kit.skin.columns * kit.skin.pitch_x_mm,
+    )
+    foam_mm3 = side_mm**2 * foam_mm + 1e6 * cover.bed.area_m2 * bed_mm
+    grams = [width * length * 1.6 * 1.85e-3, sum(one.volume for one in prints) * 1.1e-3, foam_mm3 * 33e-6]
     assert board == f"{width:.1f} x {length:.1f} mm"
     assert mass == "{:.0f} + {:.0f} + {:.1f} g".format(*grams)
     assert square == f"{sum(grams) / side_mm**2 * 1e3:.1f} kg"
-    assert height == f"{20 + 1.6 + kit.layout.switch.height_mm + np.ptp(mesh.bounds[:, 2]) + foam_mm:.1f} mm"
+    assert 1e3 * cover.bed.mass_kg == pytest.approx(sum(grams), rel=0.1)
+    below, above = (
+        5 + np.ptp(prints[2].bounds[:, 2]) + bed_mm,
+        kit.layout.switch.height_mm + np.ptp(prints[0].bounds[:, 2]),
+    )
+    assert height == f"{below + 1.6 + above + foam_mm:.1f} mm"
 
 
 def test_a_scene_is_miscounted_whose_zones_are_not_as_many_as_its_contacts():

@@ -11,6 +11,7 @@ from scipy import integrate, special
 
 from contactfpga.design.cover import (
     BODIES,
+    Bed,
     Cap,
     Cells,
     Cover,
@@ -198,6 +199,7 @@ def test_a_cover_with_caps_comes_back_from_its_file():
         *("foam", 2e-3, Switch(0.4, travel_m=2e-4, spread=0.1, hysteresis=0.2, preload_n=0.05)),
         cap=Cap(6e-3, mass_kg=1e-4),
         cut=True,
+        bed=Bed(0.01, 1.6e-3, 0.08),
     )
     assert read_cover(tomllib.loads(write_cover(cover))["cover"]) == cover
 

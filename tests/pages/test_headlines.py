@@ -1,6 +1,7 @@
 """The README's headline figures are those of the pages whose commands measure them."""
 
 import csv
+import itertools
 import re
 from pathlib import Path
 
@@ -90,6 +91,18 @@ def test_forces_are_those_of_each_kit_on_a_soft_and_a_rigid_body():
         for cell, (soft, rigid) in zip(cells, (starter, fast), strict=False):
             assert cell == f"**{soft} N** forearm, **{rigid} N** rigid"
         assert cells[2] == f"{paper[0]} N forearm, {paper[1]} N rigid with the paper's sheet"
+
+
+def test_a_late_stop_or_none_costs_no_more_than_under_the_papers_sheet():
+    """Worst and mean, on each body at both speeds."""
+    with open(ROOT / "docs/tables/arm-kits.csv", newline="") as file:
+        rows = {(row.pop("sheet"), row.pop("body"), row.pop("speed, m/s")): row for row in csv.DictReader(file)}
+    kits = [key for key in rows if key[0] in ("starter", "fast")]
+    assert len(kits) == 2 * 3 * 2
+    for (kit, *where), way in itertools.product(kits, ("6 ms", "limit alone")):
+        both = (rows[(sheet, *where)][f"{way}: worst / mean, N"] for sheet in (kit, "paper"))
+        ours, theirs = (list(map(float, text.split(" / "))) for text in both)
+        assert all(mine <= paper for mine, paper in zip(ours, theirs, strict=True)), (kit, *where, way)
 
 
 @pytest.mark.parametrize("page", ["kits.md", "safety.md"])

@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.sheet import check
@@ -18,7 +19,7 @@ from contactfpga.tools import cli
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 ALL = {
     *("sheet-board.zip", "sheet-bom.csv", "sheet-cpl.csv", "sheet-assembly.svg", "sheet-connectors.csv"),
-    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.net", "sheet.svg", "sheet-caps.stl", "skin.toml"),
+    *("sheet.kicad_pcb", "sheet.kicad_pro", "sheet.net", "sheet.svg", "sheet-caps.stl", "sheet-frame.stl", "skin.toml"),
 }
 
 
@@ -46,6 +47,15 @@ def test_all_files_are_there_and_the_circuit_is_complete(tmp_path, skin, capsys)
     assert answer["parts"]["DOME_5MM_4LEG"] == 16
     assert answer["caps"]["gap_mm"] == 0.6
     assert answer["kicad"] is None
+
+
+def test_a_sheet_on_a_bed_has_feet_as_wide_as_its_pads(tmp_path, skin):
+    bed = "thickness_m = 0.01\narea_m2 = 0.0009\nmass_kg = 0.1\n"
+    skin.write_text(skin.read_text(encoding="utf-8-sig") + f'[cover]\nmodel = "foam"\n[cover.bed]\n{bed}')
+    assert cli.main(["sheet", str(skin), "-o", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == ALL | {"sheet-feet.stl"}
+    feet = trimesh.load(tmp_path / "out" / "sheet-feet.stl").split()
+    assert [foot.extents[0] for foot in feet] == pytest.approx([15.0] * 4)
 
 
 def test_text_says_the_same(tmp_path, skin, capsys):

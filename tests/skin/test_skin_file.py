@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin, SkinError, examples
-from contactfpga.design.cover import Cap, Cover, CoverError, Switch, foams, load_cover
+from contactfpga.design.cover import Bed, Cap, Cover, CoverError, Switch, foams, load_cover
 from contactfpga.design.cover.press import read_cover, write_cover
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
@@ -260,7 +260,9 @@ def test_a_value_that_cannot_be_is_named_with_its_file(tmp_path):
     assert str(caught.value) == f"{path}: rows is 0; it must lie between 1 and 64"
 
 
-@pytest.mark.parametrize(("table", "kind"), [("cover", Cover), ("cover.cap", Cap), ("cover.switch", Switch)])
+@pytest.mark.parametrize(
+    ("table", "kind"), [("cover", Cover), ("cover.cap", Cap), ("cover.switch", Switch), ("cover.bed", Bed)]
+)
 def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
     page = (Path(__file__).resolve().parents[2] / "docs/skin.md").read_text(encoding="utf-8")
     (rows,) = re.findall(rf"^\| `\[{re.escape(table)}\]` .*\n\|[-|]+\|\n((?:\|.*\n)+)", page, re.MULTILINE)
@@ -268,7 +270,9 @@ def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
     if table == "cover":  # a foam is a name for a modulus
         name = tomllib.loads(f"x = {defaults.pop('foam').strip('`')}")["x"]
         defaults["modulus_pa"] = str(foams.find(name).layer_pa)
-    fields = {field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap")}
+    fields = {
+        field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap", "bed")
+    }
     assert defaults.keys() == fields.keys()
     for name, default in fields.items():
         if default is None:

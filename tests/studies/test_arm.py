@@ -9,7 +9,7 @@ from arm_oracle import STIFFNESS, paper_set
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from contactfpga.design.cover import elastic
+from contactfpga.design.cover import Bed, elastic
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.impact import COMPRESSION_TIME
 from contactfpga_sim.lab.arm.case import Case
@@ -112,6 +112,39 @@ def test_damped_foam_on_an_arm_that_gives_way_against_a_second_integration():
     assert result.outcome.peak_indentation_m == pytest.approx(depth.max(), rel=1e-5)
     rigid = run(free(run={"duration_s": 0.05}), "torque").outcome
     assert result.outcome.peak_force_n < 0.9 * rigid.peak_force_n
+
+
+def test_a_board_on_a_bed_of_foam_against_a_second_integration():
+    """Fixed to the arm by pads of p = E e/(1 - e), which also pull, while the foam presses a wall."""
+    bed = Bed(0.01, 1.6e-3, 0.08)
+    case = free(bed=bed, foam={"modulus_pa": 1e5, "damping": 0.9}, run={"duration_s": 0.05})
+    result = run(case, "torque")
+    mass = (case.link.inertia_kgm2 + case.motor.inertia_kgm2) / 0.2**2
+    stiff = elastic.stiffness(case.foam.half_space.ball)
+
+    def slope(_, y):
+        arm, speed, board, rate = y
+        force, strain = max(0.0, stiff * max(board, 0.0) ** 1.5 * (1 + 0.9 * rate)), (arm - board) / 0.01
+        carried = 1.6e-3 * 1e5 * strain / (1 - strain)
+        return speed, -carried / mass, rate, (carried - force) / 0.08
+
+    time = result.course["time_s"]
+    after = time >= 0
+    again = solve_ivp(slope, (0, 0.05), (0, 0.23, 0, 0.23), rtol=1e-10, atol=1e-12, t_eval=np.maximum(time[after], 0)).y
+    assert 0.2 * result.course["angle_rad"][after] == pytest.approx(again[0], abs=1e-7)
+    assert result.course["indentation_m"][after] == pytest.approx(again[2], abs=1e-7)
+    force = stiff * np.maximum(again[2], 0) ** 1.5 * (1 + 0.9 * again[3])
+    assert result.outcome.peak_force_n == pytest.approx(force.max(), rel=1e-3)
+    strain = (again[0] - again[2]) / 0.01
+    torque = 0.2 * 160 * strain / (1 - strain) * (1 - case.link.inertia_kgm2 / 0.2**2 / mass)
+    assert result.course["sensor_nm"][after] == pytest.approx(torque, abs=1e-3)
+
+
+def test_a_bed_that_is_pressed_solid_goes_on_with_its_last_slope():
+    bed = Bed(0.01, 1e-3, 0.1)
+    at = [bed.force_n(sunk, 1e5) for sunk in (0.009 - 1e-8, 0.009, 0.012)]
+    assert at[1] == pytest.approx(900.0)
+    assert (at[2] - at[1]) / 0.003 == pytest.approx((at[1] - at[0]) / 1e-8, rel=1e-4)
 
 
 def test_the_supply_limits_how_fast_the_current_rises():

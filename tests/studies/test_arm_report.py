@@ -110,6 +110,10 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
         ),
         ('like = "paper"\n[run]\nstep_s = 3.125e-6\n', "step_s is 3.125e-06; it must be a whole number of clocks"),
         ('like = "paper"\ntouch = []\n', "touch is empty"),
+        (
+            'like = "paper"\n[bed]\nthickness_m = 0.01\narea_m2 = 1e-3\nmass_kg = 0.1\n[[touch]]\n[[touch]]\n',
+            "touch has 2 things; a board on a bed does not tilt",
+        ),
         ('like = "nobody"\n', "case 'nobody' is not known"),
         ("x = \n", "not a TOML file"),
         ('like = "paper"\n[[touch]]\nx_mm = 156.0\n', "x_mm of a touch is 156; the sheet ends at 155 mm"),

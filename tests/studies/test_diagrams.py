@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import io
+import itertools
 import json
 import re
 from pathlib import Path
@@ -17,11 +18,9 @@ from contactfpga.design import kits
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import files
-from contactfpga.design.sheet.caps import PLATE_MM, caps
-from contactfpga.design.sheet.drawing import BOARDS
-from contactfpga.design.sheet.parts import DOME
 from contactfpga.tools import cli
 from contactfpga_sim.apps.latency.stages import ASSUMED_HOST_US
+from contactfpga_sim.lab.kits import steps
 from contactfpga_sim.verify import wave
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -56,24 +55,19 @@ def test_the_whole():
     }
 
 
-def test_the_cutaway():
-    cover, board_mm = load_cover(KIT.skin_path), BOARDS["plane"][0]
-    foam_mm, cap_mm = 1e3 * cover.thickness_m, 1e3 * cover.cap.side_m
-    plunger_mm = caps(SKIN, DOME, cap_mm).plunger_height_mm
-    whole_mm = foam_mm + PLATE_MM + plunger_mm + DOME.height_mm + board_mm + 1  # and the diodes below the board
-    assert with_numbers("cutaway") == {
-        f"pitch {SKIN.pitch_x_mm:g} mm",
-        f"cap {cap_mm:g} mm",
-        f"foam of {foam_mm:g} mm,",
-        f"printed cap, {PLATE_MM:g} mm,",
-        f"on a plunger of {DOME.closed_by:g} mm",
-        f"metal dome of {DOME.part.width:g} mm,",
-        f"{DOME.force_n:g} N, {DOME.travel_mm:g} mm of travel",
-        f"circuit board, {board_mm:g} mm",
-        f"{whole_mm:.1f} mm",
-        "10 mm",
-        f"{KIT.title}. To scale. The two switches under the finger are closed.",
-    }
+def test_each_step_of_the_assembly_has_its_picture(tmp_path):
+    """As drawn today; in the last one, nothing but a switch and its plunger, or parts glued together, touches."""
+    for path in steps.draw(tmp_path):
+        assert path.read_bytes() == (DOCS / "images" / path.name).read_bytes()
+        said = (DOCS / "starter.md").read_text(encoding="utf-8")
+        assert f"(images/{path.name})" in said
+    cover = load_cover(KIT.skin_path)
+    every = {one.words.partition(",")[0].partition(" of ")[0]: one.boxes for one in steps.pieces(steps.layer(), cover)}
+    caps, frame = every["caps"], every["frame"]
+    for (left, low, right, high), (a, b, c, d) in itertools.product(caps, frame):
+        assert max(a - right, left - c, b - high, low - d) > 0.049
+    plug, link = every["plug"][0], every["link"][0]
+    assert plug[1] - link[3] == pytest.approx(14.0)
 
 
 @pytest.mark.slow

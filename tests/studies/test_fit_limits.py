@@ -1,15 +1,20 @@
 """The limits of a fit, what a Skin costs, and which ones are tried."""
 
 import itertools
+import re
 
 import pytest
 from fits import BUMPER, HANDS, chosen
 from scipy.stats import binomtest
 
+from contactfpga.design.cover.stopping import peak_forces
+from contactfpga.design.cover.task import FIRST_DESIGN
 from contactfpga.skin import Skin
+from contactfpga.tools import cli
 from contactfpga_sim.apps import speed
 from contactfpga_sim.apps.fit import search
 from contactfpga_sim.apps.fit.candidates import METHODS, candidates, pitches_for, size_for
+from contactfpga_sim.apps.fit.faces import Protection, faces
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals, Measurement
 from contactfpga_sim.apps.speed import Speed
@@ -37,6 +42,41 @@ def test_a_latency_that_is_too_long_is_refused_with_its_worst(file, shortcuts, m
     refused = chosen(path, tried=tried, latency_us=worst - 1, barycenter_mm=8.0)
     assert refused.answer is None
     assert refused.cheaper[0].refusals == (f"latency {worst:.0f} us at worst, limit {worst - 1:.0f} us",)
+
+
+def test_a_cover_that_lets_an_arm_press_too_hard_is_not_tried():
+    """By the arm's force over each cover; the last limit lies between those of caps and tiles."""
+    base, size = Skin(), (80.0, 80.0)
+    by_kind = faces(("bare", "caps", "tiles"), [0.4], 5.0)
+    late = {
+        kind: peak_forces(FIRST_DESIGN, cover(10.0), 0.01, 0.01).late
+        for kind, cover in by_kind.items()
+        if kind != "bare"
+    }
+    low, high = sorted(late.values())
+    for limit, tried in ((high + 1, {*late}), ((low + high) / 2, {min(late, key=late.get)})):
+        found = candidates(
+            base,
+            [(10.0, 10.0)],
+            size,
+            METHODS[:1],
+            ["raster"],
+            covers=by_kind,
+            protection=Protection(FIRST_DESIGN, limit),
+        )
+        assert {dict(one.settings)["cover"] for one in found if one.skin} == tried
+        assert any("no foam" in one.refusal for one in found)
+    with pytest.raises(ValueError, match=r"no cover protects; .* N if the stop comes 6 ms after the touch, limit 1 N"):
+        candidates(base, [(10.0, 10.0)], size, covers=by_kind, protection=Protection(FIRST_DESIGN, 1.0))
+    stopless = Protection(FIRST_DESIGN, no_stop_n=1.0)
+    assert re.fullmatch(
+        r"\S+ N without a stop, limit 1 N", stopless.refusal(by_kind["tiles, 0.4 N"](10.0), (10.0, 10.0))
+    )
+
+
+def test_limits_of_force_need_an_arm(capsys):
+    assert cli.main(["fit", "fingers", "--late-n", "30"]) == 1
+    assert "--arm names the arm of --late-n and --no-stop-n" in capsys.readouterr().err
 
 
 def test_touches_of_the_answer_go_through_the_gateware_as_well(file, shortcuts):

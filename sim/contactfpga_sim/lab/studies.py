@@ -126,8 +126,10 @@ _ALL = (
             predictions=Section("tables:predictions_table", sample="tables:predictions_table"),
             tolerances=Section("tables:tolerances_table", sample="tables:tolerances_table"),
             sensitivity=Section("sensitivity:sensitivity_table"),
+            beds=Section("beds:beds_table"),
         ),
         compute="tables:compute",
+        pictures="steps:draw",
         extra="chart",
     ),
     Study(

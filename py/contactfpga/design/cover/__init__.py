@@ -11,12 +11,13 @@ from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.layers import BODIES, Body, Indentation
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.design.cover.point import Switch
-from contactfpga.design.cover.press import MODELS, Cap, Cover, Indenter, Load, load_cover
+from contactfpga.design.cover.press import MODELS, Bed, Cap, Cover, Indenter, Load, load_cover
 
 __all__ = [
     "BODIES",
     "MODELS",
     "Ball",
+    "Bed",
     "Body",
     "Cap",
     "Cells",

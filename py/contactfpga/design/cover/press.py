@@ -78,6 +78,37 @@ class Cap:
             raise CoverError(f"proud is {shown(self.proud)}; it must be true or false")
 
 
+SOLID = 0.9
+"""Strain from which on a pad's force goes on linearly."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Bed:
+    """Pads of the cover's foam, glued between the sheet's board and the link. The board sinks without a tilt."""
+
+    thickness_m: float
+    area_m2: float
+    """Area of all pads together."""
+    mass_kg: float
+    """Mass on the pads: board, caps and foam."""
+
+    def __post_init__(self) -> None:
+        positive("thickness_m", self.thickness_m, "m")
+        positive("area_m2", self.area_m2, "m2")
+        positive("mass_kg", self.mass_kg, "kg")
+
+    @property
+    def pad_mm(self) -> float:
+        """Side of each of four square pads."""
+        return 1e3 * math.sqrt(self.area_m2 / 4)
+
+    def force_n(self, sunk_m: float, modulus_pa: float) -> float:
+        """Force of pads with p = E e/(1 - e), below 0 if they are pulled."""
+        strain = sunk_m / self.thickness_m
+        within = min(strain, SOLID)
+        return self.area_m2 * modulus_pa * (within / (1 - within) + (strain - within) / (1 - SOLID) ** 2)
+
+
 @dataclasses.dataclass(frozen=True)
 class Cover:
     """The cover and the switches below it."""
@@ -97,6 +128,9 @@ class Cover:
     modulus_pa: float = foams.find("Plastazote LD33").layer_pa
     """E of the foam in p = E e / (1 - e). A file may have ``foam`` in its place, a name of
     :data:`contactfpga.design.cover.foams.FOAMS`."""
+
+    bed: Bed | None = None
+    """Pads below the board, for the arm's study alone; None: the board is fixed to the link."""
 
     def __post_init__(self) -> None:
         if self.model in GONE:
@@ -216,12 +250,14 @@ def read_cover(values: Any) -> Cover:
             "modulus_pa": foams.find(values["foam"]).layer_pa
         }
     given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
-    for name, kind in (("switch", Switch), ("cap", Cap)):
+    for name, kind in (("switch", Switch), ("cap", Cap), ("bed", Bed)):
         if name in given:
-            given[name] = kind(**tomlfile.fields_of(kind, f"cover.{name}", given[name], CoverError))
+            given[name] = _part(kind, name, given[name])
     cover = Cover(**given)
-    lengths = {"thickness_m": cover.thickness_m} | ({"side_m": cover.cap.side_m} if cover.cap else {})
-    for name, length in lengths.items():
+    lengths = [("thickness_m", cover.thickness_m)]
+    lengths += [("side_m", cover.cap.side_m)] if cover.cap else []
+    lengths += [("thickness_m", cover.bed.thickness_m)] if cover.bed else []
+    for name, length in lengths:
         if not MIN_LENGTH_M <= length <= MAX_LENGTH_M:
             raise CoverError(
                 f"{name} in [cover] is {length:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
@@ -233,10 +269,19 @@ def read_cover(values: Any) -> Cover:
     return cover
 
 
+def _part(kind: type, name: str, values: Any) -> Any:
+    """The part ``[cover.NAME]``, all of whose fields without a default are there."""
+    given = tomlfile.fields_of(kind, f"cover.{name}", values, CoverError)
+    for field in dataclasses.fields(kind):
+        if field.default is dataclasses.MISSING and field.name not in given:
+            raise CoverError(f"{field.name} is missing in [cover.{name}]")
+    return kind(**given)
+
+
 def write_cover(cover: Cover) -> str:
     """The TOML tables that :func:`read_cover` reads back."""
     values = dataclasses.asdict(cover)
-    parts = {name: part for name in ("cap", "switch") if (part := values.pop(name)) is not None}
+    parts = {name: part for name in ("cap", "switch", "bed") if (part := values.pop(name)) is not None}
     tables = "".join(f"\n[cover.{name}]\n" + _lines(part) for name, part in parts.items())
     return "\n[cover]\n" + _lines(values) + tables
 

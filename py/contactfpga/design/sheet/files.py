@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import gerber, kicad, orders, picture
-from contactfpga.design.sheet.caps import Caps
+from contactfpga.design.sheet.caps import Caps, feet, stl
 from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
@@ -21,8 +21,9 @@ from contactfpga.design.sheet.parts import SheetError
 NAME = "sheet"
 
 
-def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]:
-    """Write the files, ``skin_file`` as ``skin.toml``, and return their names; the same sheet gives the same bytes."""
+def write(folder: Path, layout: Layout, caps: Caps, skin_file: str, pad_mm: float | None = None) -> list[str]:
+    """Write the files, ``skin_file`` as ``skin.toml``, and return their names; the same sheet gives the same bytes.
+    ``pad_mm``: side of the pads below the board, if it lies on some."""
     drawing, skin = layout.drawing, layout.skin
     title = f"contactfpga sheet {skin.rows}x{skin.columns} {skin.fingerprint.hex()}"
     order = {**gerber.files(drawing, NAME), "fabrication.txt": orders.note(layout)}
@@ -32,13 +33,17 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str) -> list[str]
         f"{NAME}-cpl.csv": orders.placement_list(layout).encode(),
         f"{NAME}-assembly.svg": picture.assembly(drawing, title).encode(),
         f"{NAME}-connectors.csv": connectors_list(layout).encode(),
-        f"{NAME}-caps.stl": caps.stl(),
+        f"{NAME}-caps.stl": stl(caps.caps()),
         f"{NAME}.kicad_pcb": kicad.board(drawing, title, BOARDS[skin.surface][0]).encode(),
         f"{NAME}.kicad_pro": kicad.project(NAME).encode(),
         f"{NAME}.net": kicad.netlist(drawing).encode(),
         f"{NAME}.svg": picture.svg(drawing, title).encode(),
         "skin.toml": skin_file.encode(),
     }
+    if (frame := caps.frame()) is not None:
+        contents[f"{NAME}-frame.stl"] = stl(frame)
+    if pad_mm is not None:
+        contents[f"{NAME}-feet.stl"] = stl(feet(pad_mm))
     for name, content in contents.items():
         (folder / name).write_bytes(content)
     return sorted(contents)

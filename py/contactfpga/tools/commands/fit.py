@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from contactfpga.choices import labellers, scans
 from contactfpga.design.cover import load_cover
+from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
@@ -18,7 +19,7 @@ from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.apps.fit.candidates import Candidate
-    from contactfpga_sim.apps.fit.faces import Faces
+    from contactfpga_sim.apps.fit.faces import Faces, Protection
     from contactfpga_sim.apps.fit.trial import FitTask, SoFar
 
 EXTRA = "chart"
@@ -60,6 +61,10 @@ def _goal_flags(goals: flags.Flags) -> None:
     felt = "At least so many fingertips are felt; of covers that know forces."
     goals("--felt PERCENT", felt, _goal(99.999, "%"), 99.0)
     goals("--felt-n N", "Force of these fingertips.", numbers.number(0, 1000, "N", above=True), 2.0)
+    goals("--arm FILE", "Arm, impact and brake, as of contactfpga cover design, for the next two.")
+    newtons = numbers.number(0, 1e6, "N", above=True)
+    goals("--late-n N", "Peak force on a rigid body if this arm stops only after its latency.", newtons)
+    goals("--no-stop-n N", "Peak force on a rigid body if its motor goes on.", newtons)
     goals("--latency-us US", "Worst time from the touch to the last byte.", _goal(1e9, "us"), 1000.0)
 
 
@@ -128,10 +133,20 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
         [scans.find(name).name for name in args.scan] if args.scan else None,
         args.baud,
         covers,
+        _protection(args),
     )
     for one in sources:
         goals.check_count(one.most(count), any(feels(each.cover) for each in tried))
     return FitTask(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick), tried
+
+
+def _protection(args: argparse.Namespace) -> Protection | None:
+    from contactfpga_sim.apps.fit.faces import Protection
+
+    asked = args.late_n is not None or args.no_stop_n is not None
+    if asked != bool(args.arm):
+        raise ValueError("--arm names the arm of --late-n and --no-stop-n; give it with one of them at least")
+    return Protection(Task.load(args.arm), args.late_n, args.no_stop_n) if asked else None
 
 
 def _covers(args: argparse.Namespace, recorded: bool) -> Faces:

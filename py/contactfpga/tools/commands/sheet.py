@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit, longer)
     if args.kicad:
         check.require()
-    names = files.write(folder, layout, layer, text)
+    names = files.write(folder, layout, layer, text, cover.bed.pad_mm if cover and cover.bed else None)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.outline
     by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
@@ -68,11 +68,11 @@ def run(args: argparse.Namespace) -> int:
         "by_hand": collections.Counter(by_hand),
         "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
         "caps": {
-            "count": len(layer.centers),
+            "count": skin.rows * skin.columns - len(set(skin.mask)),
             "side_mm": round(layer.side_mm, 6),
             "gap_mm": round(layer.gap_mm, 6),
-            "plunger_mm": layer.plunger_mm,
-            "below_mm": layer.below_mm,
+            "plunger_mm": layer.switch.closed_by,
+            "sinks_mm": layer.sinks_mm if f"{files.NAME}-frame.stl" in names else None,
         },
         "circuit": {
             name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
@@ -107,9 +107,11 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     for words, count in answer["by_hand"].items():
         terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
     cap = answer["caps"]
+    sinks = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
+    framed = sinks if cap["sinks_mm"] else "without a frame, for which the switches are too close or the board too bent"
     terminal.say(
         f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
-        f"{cap['plunger_mm']:g} mm; {cap['below_mm']:g} mm above the switch's body when it is pressed to its end",
+        f"{cap['plunger_mm']:g} mm; {framed}",
         hang=2,
     )
     found = answer["extracted"]

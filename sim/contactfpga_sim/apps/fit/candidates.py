@@ -12,7 +12,7 @@ from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.choices.scans import SCANS
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin, SkinError
-from contactfpga_sim.apps.fit.faces import BARE, Faces, refusal
+from contactfpga_sim.apps.fit.faces import BARE, Faces, Protection, refusal
 from contactfpga_sim.apps.fit.sources import RecordingSource, Size, Source
 
 
@@ -51,20 +51,30 @@ def candidates(
     scans: Sequence[str] | None = None,
     bauds: Sequence[int] | None = None,
     covers: Faces = BARE,
+    protection: Protection | None = None,
 ) -> list[Candidate]:
     """``base`` with each near pitch (x, y) that divides the sheet, cover, method, scan and baud rate. Default
-    ``scans``: those that fit its columns."""
+    ``scans``: those that fit its columns. Raises ValueError if no cover keeps the limits of ``protection``."""
     if scans is None:
         scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
-    found = {}
+    found: dict[Any, Candidate] = {}
+    hard: list[str] = []
     for pitch, cover in itertools.product(pitches_mm, covers):
         sheet = _sheet(pitch, size_mm)
         made = covers[cover](min(sheet["pitch_x_mm"], sheet["pitch_y_mm"]))
         named = {} if made is None else {"cover": cover}
-        wide = refusal(made, (sheet["pitch_x_mm"], sheet["pitch_y_mm"]))
+        at = sheet["pitch_x_mm"], sheet["pitch_y_mm"]
+        wide = refusal(made, at)
+        if protection and not wide:
+            wide = protection.refusal(made, at)
+            hard.append(wide)
         for method, scan, baud in itertools.product(methods, scans, bauds or (base.baud,)):
             one = _candidate(base, sheet | named | method | {"scan": scan, "baud": baud}, made, wide)
             found[one.settings] = one
+    if hard and all(hard):
+        raise ValueError(
+            f"no cover protects; the last one gives {hard[-1]}: take thicker foam with --foam-mm or a cover with a bed"
+        )
     return list(found.values())
 
 

@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contactfpga.design.cover import BODIES, Cells, Cover, CoverError, Ellipse, Load, cells_of
+from contactfpga.design.cover.stopping import peak_forces
+from contactfpga.design.cover.task import Task
 from contactfpga_sim.apps import covers
 
 KINDS = ("caps", "tiles")
@@ -54,6 +56,29 @@ def refusal(cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
     except CoverError as error:
         return str(error)
     return ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Protection:
+    """Limits of the force between an arm and a rigid body; None: no limit."""
+
+    arm: Task
+    late_n: float | None = None
+    """With the arm's brake after its latency."""
+    no_stop_n: float | None = None
+
+    def refusal(self, cover: Cover | None, pitch_mm: tuple[float, float]) -> str:
+        """Why a cover is not soft enough, or empty."""
+        if cover is None or cover.model == "patch":
+            return "it has no foam, so an arm's force has no limit"
+        found = peak_forces(self.arm, cover, *(1e-3 * pitch for pitch in pitch_mm))
+        late = f"if the stop comes {1e3 * self.arm.latency_s:g} ms after the touch"
+        judged = ((found.late, self.late_n, late), (found.no_stop, self.no_stop_n, "without a stop"))
+        return "; ".join(
+            f"{force:.3g} N {when}, limit {limit:g} N"
+            for force, limit, when in judged
+            if limit is not None and force > limit
+        )
 
 
 def feels(cover: Cover | None) -> bool:

@@ -7,7 +7,7 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.design.cover import BODIES, Ball, Cap, Cover, Indenter, elastic
+from contactfpga.design.cover import BODIES, Ball, Bed, Cap, Cover, Indenter, elastic
 from contactfpga.design.cover.region import Pressing
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
@@ -55,6 +55,8 @@ class Case:
     """What the arm runs into, of :data:`contactfpga.design.cover.BODIES`; for ``foam``."""
     cap: Cap | None = None
     """Cap on each switch; None: the foam presses the switches' flush faces."""
+    bed: Bed | None = None
+    """Pads of foam below the sheet's board; None: the board is fixed to the arm."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)
@@ -65,6 +67,8 @@ class Case:
         _ = self.cover  # refuses what no cover can be
         if not self.touch:
             raise CaseError("touch is empty; the arm must run into at least one thing")
+        if self.bed and len(self.touch) > 1:
+            raise CaseError(f"touch has {len(self.touch)} things; a board on a bed does not tilt, so give one")
         if self.control.sensor_nm < self.control.torque_limit_nm:
             raise CaseError(
                 f"torque_limit_nm is {self.control.torque_limit_nm}; the sensor reads {self.control.sensor_nm} Nm at "
@@ -85,7 +89,7 @@ class Case:
     @functools.cached_property
     def cover(self) -> Cover:
         foam = self.foam
-        known = {"cap": self.cap, "cut": foam.cut, "modulus_pa": foam.modulus_pa}
+        known = {"cap": self.cap, "bed": self.bed, "cut": foam.cut, "modulus_pa": foam.modulus_pa}
         return Cover(self.model, foam.thickness_m, self.switch.switch, **known)  # type: ignore[arg-type]
 
     def spring(self, skin: Skin) -> Indenter:
@@ -113,7 +117,7 @@ class Case:
             if name == "touch":
                 change = tuple(one if isinstance(one, Touch) else dataclasses.replace(old[0], **one) for one in change)
             if isinstance(change, dict):
-                change = Cap(**change) if old is None else dataclasses.replace(old, **change)
+                change = _PARTS[name](**change) if old is None else dataclasses.replace(old, **change)
             new[name] = change
         return dataclasses.replace(self, **new)
 
@@ -122,7 +126,9 @@ class Case:
         if cover is None:
             return self
         foam = {name: getattr(cover, name) for name in ("thickness_m", "modulus_pa", "cut")}
-        return self.but(model=cover.model, cap=cover.cap, foam=foam, switch=dataclasses.asdict(cover.switch))
+        return self.but(
+            model=cover.model, cap=cover.cap, bed=cover.bed, foam=foam, switch=dataclasses.asdict(cover.switch)
+        )
 
     @classmethod
     def load(cls, name: str | Path) -> Case:
@@ -137,6 +143,7 @@ _PARTS = {
     "foam": Foam,
     "switch": Contacts,
     "cap": Cap,
+    "bed": Bed,
     "usb": Usb,
     "run": Run,
 }

@@ -55,7 +55,7 @@ def ways(kit: Kit, finger: Finger) -> tuple[Latencies, ...]:
 def study(
     fingers: Iterable[tuple[Kit, Finger]], bodies: tuple[str, ...] = BODIES, times: tuple[int, ...] = (1, 2)
 ) -> dict[Collision, list[Batch]]:
-    """Batches of touches anywhere, under each kit at these times the case's speed, under the paper's sheets at it."""
+    """Batches of touches anywhere, under the kits and the paper's sheets, at these times the case's speed."""
     paper = Case.load("paper")
     known, speed = anywhere.ways(paper, Skin()), paper.link.speed_m_s
     sheets = [
@@ -69,7 +69,6 @@ def study(
         for name, case, skin, latencies in sheets
         for body in (bodies if case.model == "foam" else ("rigid",))
         for each in times
-        if each == 1 or name not in PAPER_SHEETS
     }
 
 

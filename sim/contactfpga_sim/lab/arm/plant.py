@@ -1,11 +1,13 @@
 """Arm, gear motor, foam and touched things as one system of equations, integrated with a fixed step.
 
-The state is (theta, omega, current, then position and speed of each thing that gives way): theta in rad from the first
-touch, positive into the obstacle.
+The state is (theta, omega, current, then position and speed of each thing that gives way, then those of a board on
+its bed): theta in rad from the first touch, positive into the obstacle.
 
 - Joint with a stiff gear: (J + N^2 J_r) d omega/dt = N k i - sum d F.
 - Motor: L di/dt = u - R i - N k omega, with the voltage u = K (i_ref - i) + R i_ref + N k omega within the supply.
 - Foam pressed in by delta: F = S(delta) (1 + c d delta/dt), with the case's spring S.
+- A board of the mass m on a bed of foam, sunk by s at the lever l: m (l d omega/dt - d2 s/dt2) = B(s) - F; the joint
+  carries the bed's force B in place of F.
 
 The torque sensor between motor and arm reads J d omega/dt + sum d F.
 """
@@ -40,25 +42,29 @@ class Plant:
         self._touches = [
             (touch, touch.lever_m or case.link.lever_m, next(places) if touch.mass_kg else None) for touch in case.touch
         ]
+        self._bed, self._modulus_pa = case.bed, case.foam.modulus_pa
         self._arm_inertia = case.link.inertia_kgm2
         self._inertia = case.link.inertia_kgm2 + case.motor.inertia_kgm2
 
     def start(self, speed_rad_s: float, lead_s: float) -> State:
         """The approaching arm, ``lead_s`` before the touch."""
-        yielding = sum(place is not None for _, _, place in self._touches)
+        yielding = sum(place is not None for _, _, place in self._touches) + (self._bed is not None)
         return (-speed_rad_s * lead_s, speed_rad_s, 0.0, *(0.0,) * (2 * yielding))
 
     def forces(self, seconds: float, state: State) -> Forces:
         theta, omega, current = state[:3]
         forces, depths, torque = [], [], 0.0
+        sunk, sinks = (0.0, 0.0) if self._bed is None else state[-2:]
         for touch, lever, place in self._touches:
             given, rate = (0.0, 0.0) if place is None else (state[place], state[place + 1])
             came, coming = touch.pushed(seconds)
-            depth = lever * theta - touch.gap_m + came - given
-            force = max(0.0, self._spring.force_n(depth) * (1 + self._damping * (lever * omega + coming - rate)))
+            depth = lever * theta - touch.gap_m + came - given - sunk
+            force = max(
+                0.0, self._spring.force_n(depth) * (1 + self._damping * (lever * omega + coming - rate - sinks))
+            )
             forces.append(force)
             depths.append(depth)
-            torque += lever * force
+            torque += lever * (force if self._bed is None else self._bed.force_n(sunk, self._modulus_pa))
         acceleration = (self._motor.torque_nm_a * current - torque) / self._inertia
         return Forces(tuple(forces), tuple(depths), acceleration, self._arm_inertia * acceleration + torque)
 
@@ -77,6 +83,10 @@ class Plant:
             given, rate = state[place], state[place + 1]
             held = touch.stiffness_n_m * given + touch.damping_ns_m * rate
             found += (rate, (forces.contact_n[number] - held) / touch.mass_kg)
+        if self._bed is not None:
+            ((_, lever, _),) = self._touches
+            carried = self._bed.force_n(state[-2], self._modulus_pa)
+            found += (state[-1], lever * forces.acceleration - (carried - forces.contact_n[0]) / self._bed.mass_kg)
         return tuple(found)
 
     def step(self, seconds: float, state: State, wanted_a: float, step_s: float, forces: Forces | None = None) -> State:

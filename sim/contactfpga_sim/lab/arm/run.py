@@ -160,7 +160,11 @@ def _over(world: World) -> bool:
 
 
 def _past_peak(world: World) -> bool:
-    return bool(world.controller.events) and world.course[-1].force_n < world.peak_n / 2
+    """On the way back, as a board on a bed of foam may leave a body for a moment before."""
+    if not world.controller.events:
+        return False
+    last = world.course[-1]
+    return last.speed_rad_s < 0 and last.force_n < world.peak_n / 2
 
 
 def _slow(world: World, moment: CourseStep) -> bool:

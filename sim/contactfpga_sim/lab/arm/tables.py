@@ -85,11 +85,11 @@ def places_table(found: ArmRuns) -> writer.Table:
 
 
 def kits_table(found: ArmRuns) -> writer.Table:
-    """The page has one kit at twice the speed, and neither palms nor the paper's half-space."""
+    """The page has the starter kit and the paper's sheet, and neither palms nor a half-space."""
     head, *rows = kits.lines(found.kits)
 
     def shown(row: Sequence[str]) -> bool:
-        return row[1] != "palm" and "point" not in row[0] and (row[0] == "starter" or row[2] == rows[0][2])
+        return row[1] != "palm" and row[0] in ("starter", "paper")
 
     return writer.Table(head, rows, shown)
 

@@ -42,6 +42,12 @@ def miscounted(skin: Skin, cover: Cover | None, drawn: Drawn, workers: Executor)
     return Rate(sum(workers.map(piece, range(0, drawn.scenes, PIECE))), drawn.scenes)
 
 
+def share(rate: Rate) -> str:
+    """A share in % with its 95 % interval."""
+    low, high = rate.interval()
+    return f"{100 * rate.hits / rate.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
 def _wrong(skin: Skin, cover: Cover | None, drawn: Drawn, first: int) -> int:
     def new() -> int:
         options = {} if drawn.force_n is None else {"force_n": drawn.force_n}

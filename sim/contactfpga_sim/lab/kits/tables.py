@@ -70,7 +70,7 @@ def headline(found: list[KitFigures]) -> str:
     decision, byte, pin = zip(*(_shown(one) for one in found), strict=True)
     skin = found[0].kit.skin
     paper = skin, covers.paper(skin.pitch_x_mm)
-    *fingers, paper_fingers = (_share(rate) for rate in _rates(counts.FINGERS, paper))
+    *fingers, paper_fingers = (counts.share(rate) for rate in _rates(counts.FINGERS, paper))
     rows = [
         ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
         (
@@ -116,13 +116,8 @@ def _rates(scenes: Drawn, *beside: tuple[Skin, Cover]) -> list[Rate]:
 
 
 def counts_table() -> str:
-    rows = [(scenes.name, *(_share(rate) for rate in _rates(scenes))) for scenes in counts.SCENES]
+    rows = [(scenes.name, *(counts.share(rate) for rate in _rates(scenes))) for scenes in counts.SCENES]
     return writer.table_of([("scenes", *NAMES), *rows])
-
-
-def _share(rate: Rate) -> str:
-    low, high = rate.interval()
-    return f"{100 * rate.hits / rate.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def _peak_rows(found: list[KitFigures]) -> Iterator[tuple[str, ...]]:
@@ -194,7 +189,8 @@ def parts_table() -> writer.Table:
             maker = " ".join(filter(None, (other.maker, other.number)))
             rows.append((name, "beside it", str(other.count), other.what, maker))
     head = ("kit", "where", "count", "what", "value or maker's number")
-    return writer.Table(head, rows, lambda row: row[:2] == (NAMES[1], "beside it"), head[2:])
+    others = {row[2:] for row in rows if row[0] == NAMES[0]}
+    return writer.Table(head, rows, lambda row: row[1] == "beside it" and row[2:] not in others, head[2:])
 
 
 PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
