@@ -17,7 +17,7 @@ from contactfpga_sim.lab.kits import counts, predict
 
 KIT = kits.kit("starter")
 PADS = 4
-FINGERS, _, PAIR, *_ = counts.SCENES
+FINGERS, PAIR = counts.SCENES[0], counts.SCENES[2]
 TIMES = (1, 2)
 """Speeds of the arm, in those of the case."""
 
@@ -53,9 +53,9 @@ class Choice(NamedTuple):
     def felt(self, workers: Executor) -> tuple[str, str, str]:
         """Miscounted scenes, and the time from a finger's first touch until it is felt. Pads change neither."""
         cover = dataclasses.replace(self.cover, bed=None)
-        rates = (counts.share(counts.miscounted(KIT.skin, cover, each, workers)) for each in (FINGERS, PAIR))
+        fingers, pair = (counts.share(counts.miscounted(KIT.skin, cover, each, workers)) for each in (FINGERS, PAIR))
         level = predict.pressing(cover, {"spread": 0.0})
-        return *rates, f"{predict.measured(level, KIT.skin, 0)['first_closing_ms']:.1f}"
+        return fingers, pair, f"{predict.measured(level, KIT.skin, 0)['first_closing_ms']:.1f}"
 
 
 CHOICES = (
