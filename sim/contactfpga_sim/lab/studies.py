@@ -131,6 +131,19 @@ _ALL = (
         extra="chart",
     ),
     Study(
+        "levels",
+        title="One level of force and several, read by the host",
+        page="levels.md",
+        minutes=4,
+        sections=tables(
+            levels=Section("tables:counts_table"),
+            levels_verdict=Section("tables:verdict_table"),
+            levels_places=Section("tables:places_table"),
+        ),
+        compute="compute:compute",
+        extra="chart",
+    ),
+    Study(
         "maker",
         title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
