@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
+from scipy.interpolate import RegularGridInterpolator
 
 from contactfpga.design.cover import BODIES, Body, Cover, Ellipse, Part, medium
 from contactfpga.skin import Skin
@@ -27,7 +28,7 @@ PATCH_MM = 1.3
 """Rough width of a patch."""
 
 FOAM_MM, FLESH_POISSON = 1e3 * FOAM_M, 0.45
-REACH = 2.5
+REACH = 4.0
 """Thicknesses of flesh beyond which a force moves nothing."""
 
 AWAY = 1e6
@@ -70,16 +71,24 @@ tiles = functools.cache(Tiles)
 
 @functools.cache
 def flesh(thickness_mm: float, step_mm: float) -> np.ndarray:
-    """(n, n) displacement of flesh of 1 MPa, so many steps away in x and y, under 1 N.
+    """(n, n) displacement of flesh of 1 MPa, so many steps away in x and y, under 1 N on one patch.
 
-    1 MPa is what a wide flat body finds, as the modulus of :class:`~contactfpga.design.cover.layers.Layer` is.
+    1 MPa is what a wide flat body finds, as the modulus of :class:`~contactfpga.design.cover.layers.Layer` is. Under a
+    force on one node, nearly incompressible bricks move up and down in turns; so force and displacement are those of a
+    patch and, by halves, of its neighbors.
     """
-    near = step_mm * np.arange(math.ceil(REACH * thickness_mm / step_mm))
-    planes = np.append(near, near[-1] + thickness_mm * np.array([0.4, 1.0, 2.0]))
+    away = step_mm * np.arange(math.ceil(REACH * thickness_mm / step_mm) + 4)
+    near = away[away <= 2 * thickness_mm]
+    planes = np.append(near, np.linspace(near[-1], away[-1] + thickness_mm, 7)[1:])
     block = Block(planes, planes, np.linspace(0, thickness_mm, 6), FLESH_POISSON, (True, True))
     wide = (1 - FLESH_POISSON) / (1 + FLESH_POISSON) / (1 - 2 * FLESH_POISSON)
-    moved = block.moved(1 / wide, [0])[block.top, 2, 0].reshape(len(planes), -1)
-    return moved[: len(near), : len(near)] / 4  # the corner of a quarter takes a quarter of the force
+    moved = block.moved(1 / wide, [0])[block.top, 2, 0].reshape(len(planes), -1) / 4  # for the quarter's part of 1 N
+    quarter = RegularGridInterpolator((planes, planes), moved)(np.stack(np.meshgrid(away, away), axis=-1))
+    for axis in (0, 1):
+        whole = np.concatenate([np.flip(quarter, axis).take(range(len(away) - 1), axis), quarter], axis)
+        whole = ndimage.convolve1d(whole, np.array([1, 4, 6, 4, 1]) / 16, axis)
+        quarter = whole.take(range(len(away) - 1, 2 * len(away) - 3), axis)
+    return quarter
 
 
 class Contact:
