@@ -15,7 +15,7 @@ from study_pages import DOCS, section
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga_sim.lab import __main__ as runner
-from contactfpga_sim.lab import fingerprints, studies, writer
+from contactfpga_sim.lab import fingerprints, reach, studies, writer
 from contactfpga_sim.lab.registry import Section, Study, StudyRun
 from contactfpga_sim.lab.studies import STUDIES
 
@@ -206,11 +206,17 @@ def toy(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(studies, "STUDIES", {"toy": declared})
     monkeypatch.syspath_prepend(tmp_path)
-    fingerprints._of.cache_clear()
-    fingerprints._marks.cache_clear()
+    forget()
     yield page
     for name in [name for name in sys.modules if name.partition(".")[0] == "toys"]:
         del sys.modules[name]
+
+
+def forget():
+    """What fingerprints know of files, which a running program does not change."""
+    fingerprints._of.cache_clear()
+    reach._parsed.cache_clear()
+    reach._datum.cache_clear()
 
 
 def run(monkeypatch, *arguments):
@@ -231,8 +237,7 @@ def test_a_study_writes_its_sections_and_draws(toy, monkeypatch, capsys):
 
 def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_else(toy, monkeypatch, capsys):
     def stale():
-        fingerprints._of.cache_clear()
-        fingerprints._marks.cache_clear()
+        forget()
         assert run(monkeypatch, "--stale") == 0
         return [line for line in capsys.readouterr().out.splitlines() if line]
 
@@ -248,6 +253,8 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     moved = MAKES.partition("def fixed")
     code.write_text("from toys.toy.beside import fixed, draw\n" + moved[0])
     Path("toys/toy/beside.py").write_text("".join(moved[1:]))
+    assert stale() == []
+    code.write_text(code.read_text() + "def drawn_by_nobody():\n    return 5\n")
     assert stale() == []
     code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
     assert len(stale()) == 2

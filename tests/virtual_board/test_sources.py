@@ -193,7 +193,7 @@ def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files
 
 
 def test_a_docstring_changes_no_kept_result(tmp_path, monkeypatch):
-    monkeypatch.setattr(sources, "_folders", lambda packages: {"package": tmp_path})
+    monkeypatch.setattr(sources, "folders_of", lambda packages: {"package": tmp_path})
     text = '"""Of what."""\n\nWIDTH = 3\n"""How wide."""\n\n\ndef f():\n    """Say so."""\n    return """so"""\n'
     quiet = 'WIDTH = 3\ndef f():\n    return """so"""\n'
     louder = text.replace("How wide.", "How wide it is,\n\nin cells.").replace("Say so.", "Return so.")
@@ -254,7 +254,7 @@ def test_files_of_ones_own_count_with_what_they_import_from_beside_them(tmp_path
 
 def test_code_that_changed_while_it_ran_is_seen(tmp_path, monkeypatch):
     (tmp_path / "moving.py").write_text("x = 1")
-    monkeypatch.setattr(sources, "_folders", lambda packages: {"moving": tmp_path})
+    monkeypatch.setattr(sources, "folders_of", lambda packages: {"moving": tmp_path})
     before = sources.digest("moving")
     assert not sources.changed()
     (tmp_path / "moving.py").write_text("x = 2")

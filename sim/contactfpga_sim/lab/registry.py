@@ -65,12 +65,13 @@ class Study:
     def page_of(self, section: str) -> str:
         return self.sections[section].page or self.page
 
-    def module(self, place: str) -> str:
-        """Module of a function."""
-        return f"{self.package}.{self.name}.{place.partition(':')[0]}"
+    def place(self, name: str) -> str:
+        """Where a function is, as ``package.module:function``."""
+        return f"{self.package}.{self.name}.{name}"
 
-    def function(self, place: str) -> Callable[..., Any]:
-        found: Callable[..., Any] = getattr(importlib.import_module(self.module(place)), place.partition(":")[2])
+    def function(self, name: str) -> Callable[..., Any]:
+        module, _, function = self.place(name).partition(":")
+        found: Callable[..., Any] = getattr(importlib.import_module(module), function)
         return found
 
 

@@ -44,7 +44,7 @@ def digest(root: str, packages: tuple[str, ...] = PACKAGES, documented: bool = T
 def texts(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
     """Hash like :func:`digest` of the project's modules alone, equal in clone and wheel, for every Python and other
     versions."""
-    folders = _folders(packages)
+    folders = folders_of(packages)
     return _sha(_texts(_closure([root], folders), folders, _hash))
 
 
@@ -56,15 +56,37 @@ def changed() -> bool:
 def own(files: Iterable[Path]) -> str:
     """Hash of a user's files, with imports from the project's packages and from beside themselves."""
     files = sorted(files)
-    return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
+    return _hashed([*map(_hash, files), *_marks(map(_name, files), folders_of(PACKAGES) | _beside(files))])
 
 
-def files(modules: Iterable[str]) -> set[Path]:
-    """Files that modules reach in the project and in their own packages: imports, and data in folders beside them."""
-    modules = set(modules)
-    folders = _folders({*PACKAGES, *(module.partition(".")[0] for module in modules)})
-    found = {file for file in _closure(modules, folders).values() if file}
-    return found | {data for folder in {file.parent for file in found} for data in _data(folder)}
+def find(name: str, folders: Mapping[str, Path]) -> Path | None:
+    """File of a module in one of the folders of packages."""
+    top = name.partition(".")[0]
+    if top not in folders:
+        return None
+    path = f"{folders[top]}/{name.replace('.', '/')}"
+    return next((Path(file) for file in (f"{path}/__init__.py", f"{path}.py") if os.path.isfile(file)), None)
+
+
+def folders_of(packages: Iterable[str]) -> dict[str, Path]:
+    """Folders that packages are in."""
+    return {name: package(name).parent for name in packages}
+
+
+def data(folder: Path) -> Iterator[Path]:
+    """Files of other kinds in folders beside a module."""
+    with os.scandir(folder) as entries:
+        inner = [Path(entry) for entry in entries if entry.is_dir() and entry.name != "__pycache__"]
+    for each in inner:
+        if not (each / "__init__.py").is_file():
+            yield from (file for file in each.rglob("*") if file.is_file())
+
+
+def absolute(statement: ast.ImportFrom, name: str, is_package: bool) -> str:
+    """Module from which a module imports."""
+    parts = name.split(".") if statement.level else []
+    above = parts[: len(parts) - statement.level + is_package]
+    return ".".join((*above, *filter(None, (statement.module,))))
 
 
 def package(name: str) -> Path:
@@ -85,8 +107,8 @@ def version(name: str) -> str:
 
 
 def _digest(root: str, packages: tuple[str, ...], documented: bool) -> str:
-    folders = _folders(packages)
-    found = _find(root, folders)
+    folders = folders_of(packages)
+    found = find(root, folders)
     if found is None:
         raise ModuleNotFoundError(f"no module named {root!r}", name=root)
     roots = found.parent.rglob("*.py") if found.name == "__init__.py" else [found]
@@ -99,10 +121,6 @@ def _hashed(marks: Iterable[str]) -> str:
 
 def _sha(marks: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(marks).encode()).hexdigest()
-
-
-def _folders(packages: Iterable[str]) -> dict[str, Path]:
-    return {name: package(name).parent for name in packages}
 
 
 def _beside(files: Iterable[Path]) -> dict[str, Path]:
@@ -127,28 +145,20 @@ def _name(file: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
-    top = name.partition(".")[0]
-    if top not in folders:
-        return None
-    path = f"{folders[top]}/{name.replace('.', '/')}"
-    return next((Path(file) for file in (f"{path}/__init__.py", f"{path}.py") if os.path.isfile(file)), None)
-
-
 def _marks(
     roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False, hashed: Callable[[Path], str] | None = None
 ) -> list[str]:
     found = _closure(roots, folders, _noted if ours else lambda _: None)
     marks = _texts(found, folders, hashed or _hash)
     for folder in {file.parent for file in found.values() if file} if ours else ():
-        marks += (f"{file.name} {_hash(file)}" for file in _data(folder))
+        marks += (f"{file.name} {_hash(file)}" for file in data(folder))
     others = _tops(found) - set(folders) - set(PACKAGES) - sys.stdlib_module_names
     return sorted((*marks, *(f"{other} {version(other)}" for other in others)))
 
 
 def _texts(found: Mapping[str, Path | None], folders: Mapping[str, Path], hashed: Callable[[Path], str]) -> list[str]:
     marks = [f"{name} {hashed(file)}" for name, file in found.items() if file]
-    marks += (f"{top} {hashed(file)}" for top in _tops(found) - set(found) if (file := _find(top, folders)))
+    marks += (f"{top} {hashed(file)}" for top in _tops(found) - set(found) if (file := find(top, folders)))
     return sorted(marks)
 
 
@@ -162,7 +172,7 @@ def _closure(
     todo, found = set(roots), dict[str, Path | None]()
     while todo:
         name = todo.pop()
-        found[name] = file = _find(name, folders)
+        found[name] = file = find(name, folders)
         if file:
             about_to_read(file)
             text = file.read_bytes().decode(errors="replace")
@@ -208,23 +218,13 @@ def _docstrings(block: ast.AST) -> Iterator[int]:
             yield from _docstrings(statement)
 
 
-def _data(folder: Path) -> Iterator[Path]:
-    with os.scandir(folder) as entries:
-        inner = [Path(entry) for entry in entries if entry.is_dir() and entry.name != "__pycache__"]
-    for each in inner:
-        if not (each / "__init__.py").is_file():
-            yield from (file for file in each.rglob("*") if file.is_file())
-
-
 def _imported(text: str, name: str, is_package: bool) -> set[str]:
     found = set(_PLACE.findall(text))
     for statement in _statements(text):
         if isinstance(statement, ast.Import):
             found.update(alias.name for alias in statement.names)
         elif isinstance(statement, ast.ImportFrom):
-            parts = name.split(".") if statement.level else []
-            above = parts[: len(parts) - statement.level + is_package]
-            module = ".".join((*above, *filter(None, (statement.module,))))
+            module = absolute(statement, name, is_package)
             found.update((module, *(f"{module}.{alias.name}" for alias in statement.names)))
     return found - {""}
 
