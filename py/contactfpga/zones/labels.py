@@ -11,17 +11,21 @@ def label(cells: np.ndarray, connectivity: int) -> np.ndarray:
     ``connectivity``: 8 joins cells that share a corner, 4 only those that share an edge.
     """
     reach = 1 if connectivity == 8 else 0
-    rows, ends = (one.tolist() for one in np.nonzero(np.diff(np.asarray(cells, bool), prepend=False, append=False)))
-    runs = list(zip(rows[::2], ends[::2], ends[1::2]))  # row, first column, column after the last one
-    parents = list(range(len(runs)))
-    above = 0  # the first run of the row above that may touch this one or a later one
-    for run, (row, start, end) in enumerate(runs):
-        while runs[above][0] < row - 1 or (runs[above][0] < row and runs[above][2] + reach <= start):
-            above += 1
-        other = above
-        while runs[other][0] < row and runs[other][1] < end + reach:
-            _join(parents, other, run)
-            other += 1
+    runs: list[tuple[int, int, int]] = []  # row, first column, column after the last one
+    parents: list[int] = []
+    above: list[int] = []
+    for row, line in enumerate(np.asarray(cells, bool)):
+        edges = np.flatnonzero(np.diff(line, prepend=False, append=False)).tolist()
+        current = []
+        for start, end in zip(edges[::2], edges[1::2]):
+            run = len(runs)
+            runs.append((row, start, end))
+            parents.append(run)
+            current.append(run)
+            for other in above:
+                if runs[other][1] < end + reach and start < runs[other][2] + reach:
+                    _join(parents, other, run)
+        above = current
     labels = np.zeros(np.shape(cells), np.int64)
     numbers: dict[int, int] = {}
     for run, (row, start, end) in enumerate(runs):
