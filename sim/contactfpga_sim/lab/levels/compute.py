@@ -128,8 +128,7 @@ class Sensed:
 
 
 def outcome(sensed: Sensed, reading: Reading, there: Pressed, skin: Skin) -> Outcome:
-    read = sensed.levels(reading)
-    pitch = skin.pitch_x_mm
+    read, pitch = sensed.levels(reading), skin.pitch_x_mm
     sums = levels.moments(read, levels.label(read, skin.connectivity, reading.lasts)).tolist()
     found = [Blob(area * pitch**2, pitch * x / weight, pitch * y / weight) for area, weight, x, y in sums]
     least, most = len(there.joined), len(there.contacts)

@@ -12,7 +12,7 @@ SHOWN = ("1", "3")
 """Numbers of levels that the page shows: those of a map with one and with two bits a cell."""
 
 
-def counts_table(found: list[Judged]) -> writer.Table:
+def levels_table(found: list[Judged]) -> writer.Table:
     """Wrong counts of each design, the worst family first."""
     head = ["pitch", "levels", "forces", "wires", "map", "row", *(f"worst family, {model}" for model in MODELS)]
     more = [f"{family}, {model}" for model in MODELS for family in FAMILIES]
