@@ -134,7 +134,7 @@ _ALL = (
         "levels",
         title="One level of force and several, read by the host",
         page="levels.md",
-        minutes=3,
+        minutes=4,
         sections=tables("levels verdict places"),
         compute="compute:compute",
         extra="chart",

@@ -196,7 +196,7 @@ class Judged(NamedTuple):
         return max(((family, self.wrong[model, family]) for family in FAMILIES), key=lambda one: one[1].mean)
 
     def beats(self, other: Judged) -> bool:
-        """Whether it counts better in its worst family, beyond both intervals, by either model."""
+        """Whether it counts better in its worst family, beyond the intervals of both, by each model."""
         return all(self.worst(model)[1].high < other.worst(model)[1].low for model in MODELS)
 
 
