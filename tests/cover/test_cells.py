@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from elements import Block
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special
@@ -25,6 +24,7 @@ from contactfpga.design.cover import (
 )
 from contactfpga.design.cover.moving import MovingBody
 from contactfpga.design.cover.press import read_cover, write_cover
+from contactfpga_sim.lab.cover.elements import Block
 
 PITCH = 10e-3
 

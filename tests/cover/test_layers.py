@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from elements import Block, touching
 from scipy.special import j0
 
 from contactfpga.design.cover import medium
 from contactfpga.design.cover.layers import Indentation, Layer, Spring
 from contactfpga.design.cover.patch import Ellipse, Rectangle
 from contactfpga_sim.lab.cover import formulas
+from contactfpga_sim.lab.cover.elements import Block, touching
 
 PITCH, TILE, FOAM, MODULUS = 6.4, 5.8, 2.0, 0.345
 """Pitch, width and thickness of tiles in mm, and the modulus of their foam in MPa."""

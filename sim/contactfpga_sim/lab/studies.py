@@ -133,6 +133,15 @@ _ALL = (
         extra="chart",
     ),
     Study(
+        "levels",
+        title="One level of force and several, read by the host",
+        page="levels.md",
+        minutes=4,
+        sections=tables("levels verdict places"),
+        compute="compute:compute",
+        extra="chart",
+    ),
+    Study(
         "maker",
         title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",

@@ -38,8 +38,8 @@ def bricks(edges, poisson):
             strain[:, axis, :, axis] = slopes[..., axis]
             strain[:, 3 + axis, :, one], strain[:, 3 + axis, :, two] = slopes[..., two], slopes[..., one]
         strain[:, :3] += (middle - slopes)[:, None] / 3
-        strain = strain.reshape(-1, 6, 24)
-        found = found + strain.transpose(0, 2, 1) @ elastic @ strain
+        flat = strain.reshape(-1, 6, 24)
+        found = found + flat.transpose(0, 2, 1) @ elastic @ flat
     return found * edges.prod(axis=1)[:, None, None] / 8
 
 
