@@ -10,7 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 BOUNCE_US = 5_000
-"""Time for which a cell may be open again while others close: longer, and the contact has left it."""
+"""Time for which a cell that had closed may be open: longer, and the contact has left it."""
+
+LATE, KNOWN = 2.0, 5
+"""A contact of at least :data:`KNOWN` cells closes no further one after a pause of :data:`LATE` times its growth until
+then, unless it moves."""
 
 
 class Moments(NamedTuple):
@@ -49,10 +53,17 @@ class Growth:
         """Every cell once, by time. Cells that bounce keep their first time."""
         self.moved = False
         """Whether the contact did more than grow and shrink in place. It stays so, and nothing more is recorded."""
+        self.shrinks = False
+        """Whether a cell that had closed is open for longer than it bounces."""
         self._around = around
         self._now = self._opened = NONE
         self._opened_us = 0
         """Time since which a cell that had closed is open."""
+
+    @property
+    def span_us(self) -> int:
+        """Time from the first closing to the last."""
+        return self.closings[-1].time_us - self.closings[0].time_us
 
     def take(self, moments: Moments, time_us: int) -> None:
         """Go on with the contact's zone in the next frame."""
@@ -68,11 +79,13 @@ class Growth:
             self.moved = not self._opened.cells  # a cell that is closed cannot close
             self._opened = self._opened.plus(change, -1)
         elif change.cells:
+            before = self._now.cells + self._opened.cells - change.cells
+            self.moved = before >= KNOWN and time_us - self.closings[-1].time_us > LATE * self.span_us
             self.closings.append(Closing(time_us, change))
         else:
             self.moved = change != NONE
-        last_us = self.closings[-1].time_us
-        self.moved |= self._opened.cells > 0 and self._opened_us <= min(last_us, time_us - BOUNCE_US)
+        self.shrinks = self._opened.cells > 0 and time_us - self._opened_us >= BOUNCE_US
+        self.moved |= self.shrinks and self._opened_us <= self.closings[-1].time_us
 
     def join(self, other: Growth) -> None:
         """Add the cells of a contact whose zone is now part of this one's."""

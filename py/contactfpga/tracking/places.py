@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +24,6 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.growth import Growth
-from contactfpga.zones.zone import Zone
 
 MOST_ROWS = 100
 
@@ -39,6 +39,8 @@ class PlaceEstimate(NamedTuple):
     x_mm: float
     y_mm: float
     variance_mm2: float
+    moved: bool = False
+    """Whether the contact did more than grow in place."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,6 +54,8 @@ class Row:
     """Variance of the place along each axis."""
     barycenter_mm2: float
     """Variance of the barycenter along each axis."""
+    reach_mm: float
+    """Largest distance of the place from the barycenter. Farther, and the contact moved as it grew."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,19 +109,21 @@ class Places:
             pitches += f"{sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm"
             raise PlacesError(f"the table of places is for {pitches}; fit one with contactfpga cover places")
 
-    def of(self, growth: Growth, zone: Zone) -> PlaceEstimate:
-        """The place of a contact that grew to a zone with a place."""
-        assert zone.x_mm is not None
-        assert zone.y_mm is not None
-        times = [one.time_us for one in growth.closings]
-        cells = zone.area_cells if growth.moved else sum(one.closed.cells for one in growth.closings)
-        row = self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]
-        span_us = times[-1] - times[0] if times else 0
-        if growth.moved or span_us <= self.least_us * (cells - 1):
-            return PlaceEstimate(zone.x_mm, zone.y_mm, row.barycenter_mm2)
-        shares = [(time - times[0]) / span_us for time in times]
+    def of(self, growth: Growth, x_mm: float, y_mm: float, cells: int) -> PlaceEstimate:
+        """The place of a contact that grew to a zone of so many cells with this barycenter."""
+        closings = growth.closings
+        row = self._row(cells)
+        barycenter = PlaceEstimate(x_mm, y_mm, row.barycenter_mm2)
+        if growth.moved or growth.shrinks or growth.span_us <= self.least_us * (cells - 1):
+            return barycenter._replace(moved=growth.moved)
+        cells, span_us = sum(one.closed.cells for one in closings), growth.span_us
+        shares = [(one.time_us - closings[0].time_us) / span_us for one in closings]
         factors = [share * (row.linear + row.square * share) for share in shares]
-        mean = sum(one.closed.cells * factor for one, factor in zip(growth.closings, factors)) / cells
-        x = sum(one.closed.sum_x * (1 + factor - mean) for one, factor in zip(growth.closings, factors)) / cells
-        y = sum(one.closed.sum_y * (1 + factor - mean) for one, factor in zip(growth.closings, factors)) / cells
-        return PlaceEstimate(x * self.pitch_x_mm, y * self.pitch_y_mm, row.place_mm2)
+        mean = sum(one.closed.cells * factor for one, factor in zip(closings, factors)) / cells
+        x = sum(one.closed.sum_x * (1 + factor - mean) for one, factor in zip(closings, factors)) / cells
+        y = sum(one.closed.sum_y * (1 + factor - mean) for one, factor in zip(closings, factors)) / cells
+        place = PlaceEstimate(x * self.pitch_x_mm, y * self.pitch_y_mm, row.place_mm2)
+        return place if math.dist(place[:2], barycenter[:2]) <= row.reach_mm else barycenter._replace(moved=True)
+
+    def _row(self, cells: int) -> Row:
+        return self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]

@@ -150,7 +150,7 @@ class Tracker:
                 first.take(Moments(zone.area_cells, zone.sum_x, zone.sum_y), self._time_us)
             first.moved |= not parted.isdisjoint(names)
             self._growths[track.id] = first
-            x_mm, y_mm, variance = places.of(first, zone)
+            x_mm, y_mm, variance, first.moved = places.of(first, *place(zone), zone.area_cells)
             if self._around_mm is not None:
                 x_mm %= self._around_mm
             covariance = ((variance, 0.0), (0.0, variance))

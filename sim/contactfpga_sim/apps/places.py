@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +12,8 @@ import numpy as np
 from contactfpga.design.cover import Cover, cells_of
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
+from contactfpga.tracking.growth import Closing, Growth, Moments
 from contactfpga.tracking.places import Places, Row
-from contactfpga.tracking.tracker import Tracker
-from contactfpga.tracking.tracks import Track
-from contactfpga.wire.protocol import Frame
-from contactfpga.zones import labels
-from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.scenes.contacts import M
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -31,28 +27,40 @@ FITTED, FLAT = ("finger", "bumper"), "edge"
 CELLS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 14, 18, 23, 30, 40, 55, 75, 100)
 """Least cells of a row."""
 
+TOO_FEW = 2
+"""Cells of which a place is the barycenter: where no third one closes soon, the middle of two is the better place."""
+
 FEWEST = 100
 """States from which a row is fitted."""
 
 CHI2_95 = -2 * math.log(0.05)
 """Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
 
+FARTHEST = 0.999
+"""Share of the states whose place lies within :attr:`Row.reach_mm` of the barycenter."""
+
+ON_SHEET = 0.02
+"""Pitches by which a contact's place may differ from that of its part on the sheet."""
+
 FLATTEST = 0.95
 """Share of the states of flat bodies whose times say nothing."""
 
-Touch = tuple[Floats, tuple[tuple[float, float], ...], float]
-"""(rows, columns) closing times in s, inf for cells that stay open; places of the contacts in mm; and the time in s by
-which all forces have risen."""
+Place = tuple[float, float]
 
 
-def touch(scene: Scene, skin: Skin, cover: Cover) -> Touch:
-    """A scene of :func:`~contactfpga_sim.model.scenes.families.touches` on a cover that goes by stress."""
-    until = scene.settled_s
-    times = np.linspace(0, until, STEPS + 1)
+def closings(scene: Scene, skin: Skin, cover: Cover, levels: tuple[float, ...] = (1.0,)) -> Floats:
+    """(levels, rows, columns) closing times in s, inf for cells that stay open, under a scene of
+    :func:`~contactfpga_sim.model.scenes.families.touches` on a cover that goes by stress. ``levels``: closing forces
+    over the switch's."""
+    times = np.linspace(0, scene.settled_s, STEPS + 1)
     cells = cells_of(cover, skin.rows, skin.columns, skin.pitch_x_mm * M, skin.pitch_y_mm * M, scene.drawn)
     forces = np.array([cells.forces_n(scene.loads(seconds)) for seconds in times])
-    places = tuple((one.x_mm, one.y_mm) for one in scene.truth(until, skin).contacts)
-    return crossings(times, forces, cells.thresholds_n), places, until
+    return np.array([crossings(times, forces, level * cells.thresholds_n) for level in levels])
+
+
+def whereabouts(scene: Scene, skin: Skin | None) -> Callable[[float], list[Place]]:
+    """Places in mm of the contacts, or of their parts on the sheet, as a function of time in s."""
+    return lambda seconds: [(one.x_mm, one.y_mm) for one in scene.truth(min(seconds, scene.settled_s), skin).contacts]
 
 
 def crossings(times: Floats, forces: Floats, thresholds: Floats) -> Floats:
@@ -66,98 +74,82 @@ def crossings(times: Floats, forces: Floats, thresholds: Floats) -> Floats:
     return np.where(reached[-1] >= thresholds, found, np.inf)
 
 
-def frame(cells: np.ndarray, time_us: int, skin: Skin) -> Zones:
-    """The frame of (rows, columns) bool cells."""
-    moments = labels.moments(labels.label(cells, skin.connectivity))
-    sent = Frame(
-        sequence=0,
-        time_us=time_us % (1 << 24),
-        flags=frozenset(),
-        overwritten=0,
-        heard=0,
-        zones=len(moments),
-        cells=int(cells.sum()),
-        moments=moments,
-        bitmap=None,
-        barycenters=None,
-    )
-    return Zones(sent, skin.sheet, time_us)
-
-
-def frames(closing_s: Floats, skin: Skin, period_us: float) -> Iterator[Zones]:
-    """The frames in which cells close, of those that begin every ``period_us``."""
+def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
+    """The record of a single contact after each scan, one every ``period_us``, in which some of (..., rows, columns)
+    cells close. Cells with levels close once at each."""
     scans = np.ceil(closing_s * 1e6 / period_us - 1e-9)
+    growth = Growth()
     for scan in np.unique(scans[np.isfinite(scans)]).tolist():
-        yield frame(scans <= scan, round(scan * period_us), skin)
+        *_, rows, columns = np.nonzero(scans == scan)
+        growth.closings.append(
+            Closing(round(scan * period_us), Moments(len(rows), int(columns.sum()), int(rows.sum())))
+        )
+        yield growth
 
 
-class State(NamedTuple):
-    """A contact after a change of its zone."""
+class Draw(NamedTuple):
+    """A state of a simulated touch."""
 
-    track: Track
-    place: tuple[float, float]
-    """True place of the nearest contact in mm; no other zone is nearer to it."""
-    time_us: int
-
-
-def states(shown: Iterable[Zones], places: tuple[tuple[float, float], ...], table: Places) -> Iterator[State]:
-    """The contacts after each change of their zones, as a tracker places them."""
-    tracker, before = Tracker(places=table), {}
-    for zones in shown:
-        tracks = tracker.update(zones)
-        now = {track.id: track.zone for track in tracks.active if not track.held}
-        for track in tracks.active:
-            if track.id not in now or track.zone == before.get(track.id):
-                continue
-            place = min(places, key=lambda one: math.dist(one, middle(track)))
-            if all(math.dist(place, middle(track)) <= math.dist(place, middle(other)) for other in tracks.active):
-                yield State(track, place, tracks.time_us)
-        before = now
+    cells: int
+    pace_us: float
+    """Mean time between closings."""
+    moves: tuple[Floats, Floats]
+    """What the factors of a row multiply, in mm."""
+    off: Floats
+    """From the barycenter to the true place, in mm."""
 
 
-def middle(track: Track) -> tuple[float, float]:
-    """The barycenter of a contact's zone in mm."""
-    assert track.zone.centroid_mm is not None
-    return track.zone.centroid_mm
+def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tuple[float, ...] = (1.0,)) -> Places:
+    """The table of a sheet, by so many simulated touches of each family. Raises CoverError for the model ``patch``.
+
+    ``levels``: closing forces of each cell over the switch's.
+    """
+    skin = dataclasses.replace(skin, closed=False)
+    grew = [one for family in FITTED for one in draws(family, skin, cover, count, seed, levels)]
+    paces = [one.pace_us for one in draws(FLAT, skin, cover, count, seed, levels) if one.cells > 1]
+    least_us = float(np.quantile(paces or [0.0], FLATTEST))
+    rows = [row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grew))]
+    return Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, tuple(rows))
 
 
-def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0) -> Places:
-    """The table of a sheet, by so many simulated touches of each family. Raises CoverError for the model ``patch``."""
-    skin = dataclasses.replace(skin, closed=False, report="moments")
+def draws(
+    family: str, skin: Skin, cover: Cover, count: int, seed: int, levels: tuple[float, ...] = (1.0,)
+) -> Iterator[Draw]:
+    """The states of touches of a family by a single contact that lies on the sheet."""
     pitches = skin.pitch_x_mm, skin.pitch_y_mm
     # A table with a single factor moves a place by what that factor multiplies.
-    units = [Places(*pitches, 0.0, (Row(1, *factors, 0.0, 0.0),)) for factors in ((1.0, 0.0), (0.0, 1.0))]
-    period_us = skin.derived.frame_clocks / skin.clock_hz * 1e6
-    found: dict[str, list[tuple[int, float, list[Floats], Floats]]] = {}
-    for family in (*FITTED, FLAT):
-        found[family] = []
-        for scene in touches(family, count, seed, skin, cover):
-            closing_s, places, _ = touch(scene, skin, cover)
-            shown = list(frames(closing_s, skin, period_us))
-            for both in zip(*(states(shown, places, unit) for unit in units), strict=True):
-                first = both[0]
-                at, cells = np.array(middle(first.track)), first.track.zone.area_cells
-                pace_us = (first.time_us - first.track.since_us) / max(1, cells - 1)
-                moves = [np.array(one.track.place_mm) - at for one in both]
-                found[family].append((cells, pace_us, moves, np.array(first.place) - at))
-    least_us = float(np.quantile([pace for cells, pace, _, _ in found[FLAT] if cells > 1] or [0.0], FLATTEST))
-    grown = [one for family in FITTED for one in found[family]]
-    rows = [row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grown))]
-    return Places(*pitches, least_us, tuple(rows))
+    units = [Places(*pitches, 0.0, (Row(1, *factors, 0.0, 0.0, 1e9),)) for factors in ((1.0, 0.0), (0.0, 1.0))]
+    for scene in touches(family, count, seed, skin, cover):
+        (place,), (on_sheet, *_) = (whereabouts(scene, part)(math.inf) for part in (None, skin))
+        if math.dist(place, on_sheet) > ON_SHEET * pitches[0]:
+            continue
+        for growth in grown(closings(scene, skin, cover, levels), frame_us(skin)):
+            sums = np.sum([one.closed for one in growth.closings], axis=0)
+            cells, at = int(sums[0]), sums[1:] / sums[0] * pitches
+            moves = [np.array(unit.of(growth, *at, cells)[:2]) - at for unit in units]
+            yield Draw(cells, growth.span_us / max(1, cells - 1), (moves[0], moves[1]), np.array(place) - at)
 
 
-def _row(first: int, end: int, least_us: float, grown: list[tuple[int, float, list[Floats], Floats]]) -> Row | None:
-    here = [one for one in grown if first <= one[0] < end]
+def frame_us(skin: Skin) -> float:
+    """Time from one frame to the next in us, without waits for the line."""
+    return skin.derived.frame_clocks / skin.clock_hz * 1e6
+
+
+def _row(first: int, end: int, least_us: float, grew: list[Draw]) -> Row | None:
+    here = [one for one in grew if first <= one.cells < end]
     if len(here) < FEWEST:
         return None
-    moves, off = np.array([one[2] for one in here]), np.array([one[3] for one in here])
-    told = np.array([pace > least_us for _, pace, _, _ in here])
+    off, moves = np.array([one.off for one in here]), np.array([one.moves for one in here])
+    told = np.array([one.pace_us > least_us for one in here])
+    if first <= TOO_FEW or not told.any():
+        return Row(first, 0.0, 0.0, _variance(off), _variance(off), 0.0)
     flat = moves[told].transpose(0, 2, 1).reshape(-1, 2)
-    linear, square = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0].tolist() if first > 1 else (0.0, 0.0)
-    left = off[told] - np.array([linear, square]) @ moves[told]
-    return Row(first, linear, square, _variance(left), _variance(off))
+    factors = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0]
+    moved = factors @ moves[told]
+    reach_mm = float(np.quantile(np.hypot(*moved.T), FARTHEST))
+    return Row(first, *factors.tolist(), _variance(off[told] - moved), _variance(off), reach_mm)
 
 
 def _variance(off: Floats) -> float:
     """Variance along each axis of which 95 % of (n, 2) offsets keep the limit."""
-    return float(np.quantile((off**2).sum(axis=1), 0.95) / CHI2_95) if len(off) else 0.0
+    return float(np.quantile((off**2).sum(axis=1), 0.95) / CHI2_95)
