@@ -112,18 +112,22 @@ class Places:
     def of(self, growth: Growth, x_mm: float, y_mm: float, cells: int) -> PlaceEstimate:
         """The place of a contact that grew to a zone of so many cells with this barycenter."""
         closings = growth.closings
-        row = self._row(cells)
-        barycenter = PlaceEstimate(x_mm, y_mm, row.barycenter_mm2)
-        if growth.moved or growth.shrinks or growth.span_us <= self.least_us * (cells - 1):
-            return barycenter._replace(moved=growth.moved)
-        cells, span_us = sum(one.closed.cells for one in closings), growth.span_us
-        shares = [(one.time_us - closings[0].time_us) / span_us for one in closings]
+        recorded = sum(one.closed.cells for one in closings)
+        barycenter = PlaceEstimate(x_mm, y_mm, self._row(cells).barycenter_mm2, growth.moved)
+        if growth.moved or growth.shrinks or growth.span_us <= self.least_us * (recorded - 1):
+            return barycenter
+        row = self._row(recorded)
+        shares = [(one.time_us - closings[0].time_us) / growth.span_us for one in closings]
         factors = [share * (row.linear + row.square * share) for share in shares]
-        mean = sum(one.closed.cells * factor for one, factor in zip(closings, factors)) / cells
-        x = sum(one.closed.sum_x * (1 + factor - mean) for one, factor in zip(closings, factors)) / cells
-        y = sum(one.closed.sum_y * (1 + factor - mean) for one, factor in zip(closings, factors)) / cells
-        place = PlaceEstimate(x * self.pitch_x_mm, y * self.pitch_y_mm, row.place_mm2)
-        return place if math.dist(place[:2], barycenter[:2]) <= row.reach_mm else barycenter._replace(moved=True)
+        mean = sum(one.closed.cells * factor for one, factor in zip(closings, factors)) / recorded
+        weights = [(factor - mean) / recorded for factor in factors]
+        dx_mm = self.pitch_x_mm * sum(one.closed.sum_x * weight for one, weight in zip(closings, weights))
+        dy_mm = self.pitch_y_mm * sum(one.closed.sum_y * weight for one, weight in zip(closings, weights))
+        if math.hypot(dx_mm, dy_mm) > row.reach_mm:
+            return barycenter._replace(moved=True)
+        x = sum(one.closed.sum_x for one in closings) / recorded
+        y = sum(one.closed.sum_y for one in closings) / recorded
+        return PlaceEstimate(self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, row.place_mm2)
 
     def _row(self, cells: int) -> Row:
         return self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]

@@ -133,9 +133,8 @@ class Tracker:
         """The contacts with their places by the order in which their cells closed."""
         sheet, before, found = self._sheet, self._growths, []
         assert sheet is not None
-        parted = {
-            event.id for event in self._events if event.kind == "split" or (event.kind == "down" and event.parents)
-        }
+        split = (event for event in self._events if event.kind == "split" or (event.kind == "down" and event.parents))
+        parted = {name for event in split for name in (event.id, *event.parents)}
         self._growths = {}
         for track in active:
             zone, names = track.zone, (track.id, *track.merged)

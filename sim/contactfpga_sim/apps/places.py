@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover import Cover, cells_of
+from contactfpga.design.cover import Cells, Cover, cells_of
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
+from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.growth import Closing, Growth, Moments
 from contactfpga.tracking.places import Places, Row
 from contactfpga_sim.model.scenes.contacts import M
@@ -52,10 +53,14 @@ def closings(scene: Scene, skin: Skin, cover: Cover, levels: tuple[float, ...] =
     """(levels, rows, columns) closing times in s, inf for cells that stay open, under a scene of
     :func:`~contactfpga_sim.model.scenes.families.touches` on a cover that goes by stress. ``levels``: closing forces
     over the switch's."""
-    times = np.linspace(0, scene.settled_s, STEPS + 1)
-    cells = cells_of(cover, skin.rows, skin.columns, skin.pitch_x_mm * M, skin.pitch_y_mm * M, scene.drawn)
-    forces = np.array([cells.forces_n(scene.loads(seconds)) for seconds in times])
-    return np.array([crossings(times, forces, level * cells.thresholds_n) for level in levels])
+    times, sheet = np.linspace(0, scene.settled_s, STEPS + 1), cells(scene, skin, cover)
+    forces = np.array([sheet.forces_n(scene.loads(seconds)) for seconds in times])
+    return np.array([crossings(times, forces, level * sheet.thresholds_n) for level in levels])
+
+
+def cells(scene: Scene, skin: Skin, cover: Cover) -> Cells:
+    """The sheet that is drawn for a scene."""
+    return cells_of(cover, skin.rows, skin.columns, skin.pitch_x_mm * M, skin.pitch_y_mm * M, scene.drawn)
 
 
 def whereabouts(scene: Scene, skin: Skin | None) -> Callable[[float], list[Place]]:
@@ -124,10 +129,15 @@ def draws(
         if math.dist(place, on_sheet) > ON_SHEET * pitches[0]:
             continue
         for growth in grown(closings(scene, skin, cover, levels), frame_us(skin)):
-            sums = np.sum([one.closed for one in growth.closings], axis=0)
-            cells, at = int(sums[0]), sums[1:] / sums[0] * pitches
-            moves = [np.array(unit.of(growth, *at, cells)[:2]) - at for unit in units]
-            yield Draw(cells, growth.span_us / max(1, cells - 1), (moves[0], moves[1]), np.array(place) - at)
+            count, at = middle(growth, skin.sheet)
+            moves = [np.subtract(unit.of(growth, *at, count)[:2], at) for unit in units]
+            yield Draw(count, growth.span_us / max(1, count - 1), (moves[0], moves[1]), np.subtract(place, at))
+
+
+def middle(growth: Growth, sheet: Sheet) -> tuple[int, Place]:
+    """Number of cells of a record, and their barycenter in mm."""
+    count, x, y = np.sum([one.closed for one in growth.closings], axis=0).tolist()
+    return count, (x / count * sheet.pitch_x_mm, y / count * sheet.pitch_y_mm)
 
 
 def frame_us(skin: Skin) -> float:

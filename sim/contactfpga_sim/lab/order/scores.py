@@ -16,18 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design import kits
-from contactfpga.design.cover import Body, Cover, cells_of, load_cover
+from contactfpga.design.cover import Body, Cover, load_cover
 from contactfpga.design.cover.layers import Layer
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.tracking.places import Places
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Track, Tracks
-from contactfpga.wire.protocol import Frame
-from contactfpga.zones import labels
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.apps import places, pool
 from contactfpga_sim.apps.places import Place
 from contactfpga_sim.apps.stats import Z95
+from contactfpga_sim.lab.tracking.scenes import zones_of
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.families import APPROACH_MM_S, placements
 from contactfpga_sim.model.scenes.scene import Scene
@@ -44,13 +43,14 @@ RATES_HZ = (1000.0, 3000.0, HZ, 1e6 / places.frame_us(kits.kit("fast").skin))
 LEVELS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Levels over the switch's closing force, of cells that no kit has."""
 
-ANALOG_N, ANALOG_STEPS = 10.0, 255
-"""Full scale of an analog array, and its steps."""
+ANALOG, ANALOG_STEPS = 25.0, 255
+"""Full scale of an analog array over the closing force, and its steps. Its gains have the spread of the closing
+forces."""
 
 AFTER_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
 """Times since the first cell closed."""
 
-COUNT, MOVING_COUNT, PIECE, SEED = 400, 60, 20, 53
+COUNT, MOVING_COUNT, PIECE, SEED = 400, 40, 20, 53
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,30 +132,12 @@ def drawn(case: Case, number: int) -> tuple[Scene, np.random.Generator]:
     return scene.approaching(float(rng.uniform(*APPROACH_MM_S))).on_cover(SKIN, cover(case.spread)), rng
 
 
-def frame(cells: np.ndarray, time_us: int) -> Zones:
-    """The frame of (rows, columns) bool cells."""
-    moments = labels.moments(labels.label(cells, SKIN.connectivity))
-    sent = Frame(
-        sequence=0,
-        time_us=time_us % (1 << 24),
-        flags=frozenset(),
-        overwritten=0,
-        heard=0,
-        zones=len(moments),
-        cells=int(cells.sum()),
-        moments=moments,
-        bitmap=None,
-        barycenters=None,
-    )
-    return Zones(sent, SHEET, time_us)
-
-
 def frames(changes_s: Floats, hz: float) -> Iterator[Zones]:
     """The frames in which cells change. (n, rows, columns) ``changes_s`` rise: a cell closes at the first time, opens
     at the second, and so on."""
     scans = np.ceil(changes_s * hz - 1e-9)
     for scan in np.unique(scans[np.isfinite(scans)]).tolist():
-        yield frame((scans <= scan).sum(axis=0) % 2 == 1, round(scan / hz * 1e6))
+        yield zones_of((scans <= scan).sum(axis=0) % 2 == 1, round(scan / hz * 1e6), SKIN)[0]
 
 
 class Outcome(NamedTuple):
@@ -177,9 +159,8 @@ def judged(tracks: Tracks, there: list[Place]) -> list[Outcome]:
         if math.dist(_middle(track), place) <= min(math.dist(_middle(track), other) for other in there):
             assert track.place_mm is not None
             assert track.place_cov_mm2 is not None
-            covered = _covered(math.dist(track.place_mm, place), track.place_cov_mm2[0][0])
-            errors = (math.dist(at, place) for at in (track.place_mm, _middle(track)))
-            found.append(Outcome(*errors, covered, track.moved))
+            errors = [math.dist(at, place) for at in (track.place_mm, _middle(track))]
+            found.append(Outcome(*errors, _covered(errors[0], track.place_cov_mm2[0][0]), track.moved))
     return found
 
 
@@ -234,30 +215,27 @@ def _levels(closing_s: Floats, hz: float, place: Place) -> Timeline:
     """A single contact of cells with levels, each crossing of which counts as a closing."""
     times_us, found = [], []
     for growth in places.grown(closing_s, 1e6 / hz):
-        times_us.append(growth.closings[-1].time_us)
-        rows, columns = np.nonzero((np.ceil(closing_s * hz - 1e-9) <= round(times_us[-1] * hz / 1e6)).any(axis=0))
-        middle = columns.mean() * PITCHES_MM[0], rows.mean() * PITCHES_MM[1]
-        one = table(LEVELS).of(growth, *middle, sum(each.closed.cells for each in growth.closings))
+        cells, middle = places.middle(growth, SHEET)
+        one = table(LEVELS).of(growth, *middle, cells)
         off = math.dist(one[:2], place)
+        times_us.append(growth.closings[-1].time_us)
         found.append(Outcome(off, math.dist(middle, place), _covered(off, one.variance_mm2), one.moved))
     return _at(times_us, found.__getitem__)
 
 
 def _analog(scene: Scene, place: Place, first_s: float) -> Timeline:
     """A single contact by the forces on all cells at one moment, after the first switch would have closed."""
-    sizes = SHEET.rows, SHEET.columns, SHEET.pitch_x_mm * contacts.M, SHEET.pitch_y_mm * contacts.M
-    rows, columns = np.indices(sizes[:2])
-
-    def read(seconds: float) -> Outcome | None:
-        forces = cells_of(cover(), *sizes, scene.drawn).forces_n(scene.loads(min(seconds, scene.settled_s)))
-        steps = np.clip(np.rint(forces / ANALOG_N * ANALOG_STEPS), 0, ANALOG_STEPS)
-        if not steps.sum():
-            return None
-        at = [(steps * one).sum() / steps.sum() * pitch for one, pitch in zip((columns, rows), PITCHES_MM)]
-        off = math.dist(at, place)
-        return Outcome(off, off, math.nan, math.nan)
-
-    return [read(first_s + 1e-3 * after) for after in AFTER_MS] + [read(math.inf)]
+    found: Timeline = []
+    sheet = places.cells(scene, SKIN, cover())
+    for seconds in (*(first_s + 1e-3 * after for after in AFTER_MS), math.inf):
+        shares = sheet.forces_n(scene.loads(min(seconds, scene.settled_s))) / sheet.thresholds_n
+        steps = np.clip(np.rint(shares / ANALOG * ANALOG_STEPS), 0, ANALOG_STEPS)
+        at = [
+            (steps.sum(axis=axis) @ np.arange(steps.shape[1 - axis])) / steps.sum() * PITCHES_MM[axis]
+            for axis in (0, 1)
+        ]
+        found.append(Outcome(math.dist(at, place), math.dist(at, place), math.nan, math.nan))
+    return found
 
 
 # ---- touches that move
@@ -278,7 +256,8 @@ def moved(case: Case, number: int) -> Timeline:
     cells = Scene((dataclasses.replace(contact, x_mm=x, y_mm=y),), scene.drawn).on(SKIN, cover())
     tracker, found = Tracker(places=table()), []
     for seconds in np.arange(step_s, max(scene.settled_s, end_s) + WAIT_S, step_s).tolist():
-        found += judged(tracker.update(frame(cells(seconds), round(seconds * 1e6))), [(x(seconds), y(seconds))])
+        zones, _ = zones_of(cells(seconds), round(seconds * 1e6), SKIN)
+        found += judged(tracker.update(zones), [(x(seconds), y(seconds))])
     whole = averaged(found)
     return [whole and whole._replace(moved=found[-1].moved)]
 
