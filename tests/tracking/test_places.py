@@ -32,24 +32,50 @@ def spot(rng, count):
 
 
 def test_the_place_is_the_weighted_mean_of_the_cells(rng):
-    for _ in range(30):
+    """Also of cells that close together, and of zones that begin apart and meet, if the tracker does not mistake one of
+    them for another."""
+    met = mistaken = 0
+    for number in range(60):
         cells = spot(rng, 7)
-        times = np.cumsum([1000, *(rng.randint(300, 3000) for _ in cells[1:])])
-        shown, tracker = np.zeros((16, 16), bool), Tracker(places=TABLE)
-        for count, (cell, time_us) in enumerate(zip(cells, times.tolist()), 1):
-            shown[cell] = True
-            (track,) = tracker.update(pressed(time_us, shown, skin=SKIN)).active
+        apart = number % 2
+        if apart:
+            rng.shuffle(cells)
+        steps = [rng.choice([0, 600][apart:]) + apart * rng.randint(0, 2000) for _ in cells[2:]]
+        times, shown, tracker = np.cumsum([1000, 3000, *steps]), np.zeros((16, 16), bool), Tracker(places=TABLE)
+        for time_us in np.unique(times).tolist():
+            count = int((times <= time_us).sum())
+            shown[tuple(np.array(cells[:count]).T)] = True
+            track, *others = tracker.update(pressed(time_us, shown, skin=SKIN)).active
+            if others or track.moved:
+                continue
+            met += bool(track.merged)
             y, x = np.array(cells[:count]).T * [[8.0], [6.0]]
             share = (times[:count] - 1000) / max(1, time_us - 1000)
             weight = -1.5 * share + 0.5 * share**2 if count > 2 else np.zeros(count)
             weight = (1 + weight - weight.mean()) / count
-            assert track.place_mm == pytest.approx((weight @ x, weight @ y), abs=1e-9)
+            assert track.place_mm == pytest.approx((weight @ x, weight @ y), abs=1e-9), number
             assert track.place_cov_mm2[0] == ((5.0, 4.0, 0.5)[min(count, 3) - 1], 0.0)
+        mistaken += track.moved
+    assert met > 30
+    assert mistaken < 4
     assert set(track.to_dict()) - set(Tracker().update(pressed(0, shown, skin=SKIN)).active[0].to_dict()) == {
         "place_mm",
         "place_cov_mm2",
         "moved",
     }
+
+
+def test_a_contact_whose_cells_open_has_its_barycenter_until_they_close():
+    tracker, square = Tracker(places=TABLE), [(8, 8), (8, 9), (9, 8), (9, 9)]
+    shown = np.zeros((16, 16), bool)
+    for number, (cell, told) in enumerate(
+        [(square[0], False), (square[1], False), (square[2], True), (square[3], True), (square[3], True)]
+        + [(None, False), (square[3], True)]
+    ):
+        if cell is not None:
+            shown[cell] ^= True
+        (track,) = tracker.update(pressed(number * 6000, shown, skin=SKIN)).active
+        assert (track.place_mm != track.zone.centroid_mm, track.moved) == (told, False), number
 
 
 def test_cells_that_close_at_once_far_apart_or_after_a_part_left_give_the_barycenter():

@@ -56,7 +56,9 @@ class Growth:
         self.shrinks = False
         """Whether a cell that had closed is open for longer than it bounces."""
         self._around = around
-        self._now = self._opened = NONE
+        self.now = NONE
+        """Moments of the zone in the last frame."""
+        self._opened = NONE
         self._opened_us = 0
         """Time since which a cell that had closed is open."""
 
@@ -68,19 +70,19 @@ class Growth:
     def take(self, moments: Moments, time_us: int) -> None:
         """Go on with the contact's zone in the next frame."""
         moments = moments.shifted(self._turn(moments))
-        change = moments.plus(self._now, -1)
-        self._now = moments
+        change = moments.plus(self.now, -1)
+        self.now = moments
         if self.moved:
             return
         if change.cells < 0:
             self._opened_us = self._opened_us if self._opened.cells else time_us
             self._opened = self._opened.plus(change, -1)
-        elif change.cells and (change == self._opened or any(change == one.closed for one in self.closings)):
+        elif change.cells and (change == self._opened or self._has(change)):
             self.moved = not self._opened.cells  # a cell that is closed cannot close
             self._opened = self._opened.plus(change, -1)
         elif change.cells:
-            before = self._now.cells + self._opened.cells - change.cells
-            self.moved = before >= KNOWN and time_us - self.closings[-1].time_us > LATE * self.span_us
+            before = self.now.cells + self._opened.cells - change.cells
+            self.moved = before >= KNOWN and 0 < LATE * self.span_us < time_us - self.closings[-1].time_us
             self.closings.append(Closing(time_us, change))
         else:
             self.moved = change != NONE
@@ -89,17 +91,21 @@ class Growth:
 
     def join(self, other: Growth) -> None:
         """Add the cells of a contact whose zone is now part of this one's."""
-        shift = self._turn(other._now)
-        self._now = self._now.plus(other._now.shifted(shift))
+        shift = self._turn(other.now)
+        self.now = self.now.plus(other.now.shifted(shift))
         self.closings = sorted(self.closings + [Closing(at, one.shifted(shift)) for at, one in other.closings])
         open_since = [one._opened_us for one in (self, other) if one._opened.cells]
         self._opened_us = min(open_since, default=0)
         self._opened = self._opened.plus(other._opened.shifted(shift))
         self.moved |= other.moved
 
+    def _has(self, change: Moments) -> bool:
+        """Whether a change is a single cell that is known to have closed."""
+        return change.cells == 1 and any(change == one.closed for one in self.closings)
+
     def _turn(self, moments: Moments) -> int:
         """Columns by which to shift a zone so that it lies on the same turn as this one."""
-        if not (self._around and self._now.cells and moments.cells):
+        if not (self._around and self.now.cells and moments.cells):
             return 0
-        apart = self._now.sum_x / self._now.cells - moments.sum_x / moments.cells
+        apart = self.now.sum_x / self.now.cells - moments.sum_x / moments.cells
         return self._around * round(apart / self._around)

@@ -60,7 +60,16 @@ class Row:
 
 @dataclasses.dataclass(frozen=True)
 class Places:
-    """A table that places contacts, fitted to a sheet and its cover: ``Tracker(places=Places.load("places.toml"))``."""
+    """A table that places contacts by the order in which their cells close, fitted to a sheet and its cover
+    (docs/tracking.md).
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> from contactfpga.tracking.places import Row
+    >>> row = Row(cells=1, linear=-2.0, square=0.5, place_mm2=0.5, barycenter_mm2=1.5, reach_mm=3.0)
+    >>> places = contactfpga.Places(10.0, 10.0, least_us=200.0, rows=(row,))
+    >>> contactfpga.Tracker(places=places).update(zones).active[0].place_mm
+    (55.0, 75.0)
+    """
 
     pitch_x_mm: float
     pitch_y_mm: float

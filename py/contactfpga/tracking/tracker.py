@@ -133,8 +133,14 @@ class Tracker:
         """The contacts with their places by the order in which their cells closed."""
         sheet, before, found = self._sheet, self._growths, []
         assert sheet is not None
-        split = (event for event in self._events if event.kind == "split" or (event.kind == "down" and event.parents))
-        parted = {name for event in split for name in (event.id, *event.parents)}
+        areas = {track.id: track.zone.area_cells for track in active}
+        parted = {
+            name
+            for event in self._events
+            if event.kind in ("split", "down")
+            and any(areas.get(one, 0) < before[one].now.cells for one in event.parents if one in before)
+            for name in (event.id, *event.parents)
+        }
         self._growths = {}
         for track in active:
             zone, names = track.zone, (track.id, *track.merged)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,7 +36,7 @@ FEWEST = 100
 CHI2_95 = -2 * math.log(0.05)
 """Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
 
-FARTHEST = 0.999
+FARTHEST = 0.99
 """Share of the states whose place lies within :attr:`Row.reach_mm` of the barycenter."""
 
 ON_SHEET = 0.02
@@ -86,22 +85,14 @@ def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
     growth = Growth()
     for scan in np.unique(scans[np.isfinite(scans)]).tolist():
         *_, rows, columns = np.nonzero(scans == scan)
-        growth.closings.append(
-            Closing(round(scan * period_us), Moments(len(rows), int(columns.sum()), int(rows.sum())))
-        )
+        closed = Moments(len(rows), int(columns.sum()), int(rows.sum()))
+        growth.closings.append(Closing(round(scan * period_us), closed))
         yield growth
 
 
-class Draw(NamedTuple):
-    """A state of a simulated touch."""
-
-    cells: int
-    pace_us: float
-    """Mean time between closings."""
-    moves: tuple[Floats, Floats]
-    """What the factors of a row multiply, in mm."""
-    off: Floats
-    """From the barycenter to the true place, in mm."""
+Draw = tuple[int, float, list[Floats], Floats]
+"""A state of a simulated touch: number of cells; mean time between closings in us; what the factors of a row multiply;
+and the true place, both from the barycenter in mm."""
 
 
 def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tuple[float, ...] = (1.0,)) -> Places:
@@ -111,7 +102,7 @@ def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tupl
     """
     skin = dataclasses.replace(skin, closed=False)
     grew = [one for family in FITTED for one in draws(family, skin, cover, count, seed, levels)]
-    paces = [one.pace_us for one in draws(FLAT, skin, cover, count, seed, levels) if one.cells > 1]
+    paces = [pace_us for cells, pace_us, _, _ in draws(FLAT, skin, cover, count, seed, levels) if cells > 1]
     least_us = float(np.quantile(paces or [0.0], FLATTEST))
     rows = [row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grew))]
     return Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, tuple(rows))
@@ -131,7 +122,7 @@ def draws(
         for growth in grown(closings(scene, skin, cover, levels), frame_us(skin)):
             count, at = middle(growth, skin.sheet)
             moves = [np.subtract(unit.of(growth, *at, count)[:2], at) for unit in units]
-            yield Draw(count, growth.span_us / max(1, count - 1), (moves[0], moves[1]), np.subtract(place, at))
+            yield count, growth.span_us / max(1, count - 1), moves, np.subtract(place, at)
 
 
 def middle(growth: Growth, sheet: Sheet) -> tuple[int, Place]:
@@ -146,11 +137,11 @@ def frame_us(skin: Skin) -> float:
 
 
 def _row(first: int, end: int, least_us: float, grew: list[Draw]) -> Row | None:
-    here = [one for one in grew if first <= one.cells < end]
+    here = [one for one in grew if first <= one[0] < end]
     if len(here) < FEWEST:
         return None
-    off, moves = np.array([one.off for one in here]), np.array([one.moves for one in here])
-    told = np.array([one.pace_us > least_us for one in here])
+    _, paces_us, moves, off = (np.array(column) for column in zip(*here))
+    told = paces_us > least_us
     if first <= TOO_FEW or not told.any():
         return Row(first, 0.0, 0.0, _variance(off), _variance(off), 0.0)
     flat = moves[told].transpose(0, 2, 1).reshape(-1, 2)

@@ -171,7 +171,7 @@ _ALL = (
         "order",
         title="Places by the order in which cells close",
         page="tracking.md",
-        minutes=3,
+        minutes=2,
         sections=tables(
             order_places=Section("tables:places_table"),
             order_times=Section("tables:times_table"),

@@ -37,8 +37,8 @@ PITCHES_MM = SHEET.pitch_x_mm, SHEET.pitch_y_mm
 FIRM = Body("firm", 3e-3, Layer(6e-3, 200e3), "chosen: a firm fingertip, or soft rubber")
 
 HZ = 10_000.0
-RATES_HZ = (1000.0, 3000.0, HZ, 1e6 / places.frame_us(kits.kit("fast").skin))
-"""Frames per second of a slow, a usual and a fast raster scan, and of the fast kit's reversal."""
+RATES_HZ = (100.0, 1000.0, 3000.0, HZ, 1e6 / places.frame_us(kits.kit("fast").skin))
+"""Frames per second of raster scans, and of the fast kit's reversal."""
 
 LEVELS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Levels over the switch's closing force, of cells that no kit has."""

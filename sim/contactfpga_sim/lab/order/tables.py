@@ -52,16 +52,13 @@ def times_table(found: Found) -> writer.Table:
 def draw(folder: Path, found: Found) -> Path:
     import matplotlib
 
-    colors = (style.GRAY, style.ORANGE, style.VERMILLION, style.BLUE, style.GREEN, style.PURPLE)
+    lines = {"barycenter": [one.barycenter for one in found[TIMED[len(scores.RATES_HZ) - 1]]]}
+    lines |= {case.title: [one.place for one in found[case]] for case in TIMED}
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(3.2)
+        figure = style.new(3.4)
         axes = figure.subplots()
-        last = found[TIMED[len(scores.RATES_HZ) - 1]]
-        axes.plot(AFTER_MS, [one.barycenter for one in last[:SETTLED]], color="black", ls="dotted", label="barycenter")
-        for case, color in zip(TIMED, colors):
-            axes.plot(
-                AFTER_MS, [one.place for one in found[case][:SETTLED]], color=color, marker="o", ms=4, label=case.title
-            )
+        for (title, errors), color in zip(lines.items(), (style.GRAY, *style.PALETTE)):
+            axes.plot(AFTER_MS, errors[:SETTLED], color=color, marker="o", ms=4, label=title)
         axes.set(xscale="log", ylim=(0, None), xlabel="time since the first cell closed, ms", ylabel="mean error, mm")
         axes.set_xticks(AFTER_MS, [f"{after:g}" for after in AFTER_MS])
         axes.minorticks_off()
