@@ -77,6 +77,13 @@ def test_what_no_growth_in_place_does_is_a_move(frames):
     assert growth.closings == recorded  # nor is more recorded, so that it does not grow for ever
 
 
+def test_cells_that_open_and_close_together_or_come_late_at_a_low_rate_do_not_move():
+    bounced = grown([CELLS[:1], CELLS[:3], CELLS[:1], CELLS[:3]])
+    assert bounced.closings == [closing(0, CELLS[0]), closing(STEP_US, *CELLS[1:3])]
+    five = [(0, column) for column in range(5)]
+    assert not any(one.moved or one.shrinks for one in (bounced, grown([five, five, [*five, (0, 5)]])))
+
+
 def test_a_cell_that_closes_long_after_five_others_is_a_move():
     five = [(0, column) for column in range(5)]
     steps = [five[: 1 + number] for number in range(5)]

@@ -113,9 +113,9 @@ class Places:
         """Raises :class:`PlacesError` for a sheet whose contacts the table cannot place."""
         if sheet.report == "barycenter":
             raise PlacesError("report is 'barycenter', which loses the sums of a zone's cells; take report = 'moments'")
-        if (sheet.pitch_x_mm, sheet.pitch_y_mm) != (self.pitch_x_mm, self.pitch_y_mm):
-            pitches = f"{self.pitch_x_mm:g} x {self.pitch_y_mm:g} mm; the sheet has "
-            pitches += f"{sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm"
+        own, there = ((one.pitch_x_mm, one.pitch_y_mm) for one in (self, sheet))
+        if not all(math.isclose(one, other, rel_tol=1e-3) for one, other in zip(own, there)):
+            pitches = "{:g} x {:g} mm; the sheet has {:g} x {:g} mm".format(*own, *there)
             raise PlacesError(f"the table of places is for {pitches}; fit one with contactfpga cover places")
 
     def of(self, growth: Growth, x_mm: float, y_mm: float, cells: int) -> PlaceEstimate:

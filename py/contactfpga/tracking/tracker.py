@@ -133,6 +133,7 @@ class Tracker:
         """The contacts with their places by the order in which their cells closed."""
         sheet, before, found = self._sheet, self._growths, []
         assert sheet is not None
+        # Of a zone that parted nobody knows which cells went; one beside a zone that kept its cells is new.
         areas = {track.id: track.zone.area_cells for track in active}
         parted = {
             name
@@ -144,22 +145,25 @@ class Tracker:
         self._growths = {}
         for track in active:
             zone, names = track.zone, (track.id, *track.merged)
-            first, *others = [before[name] for name in names if name in before] or [
+            # Contacts of one zone have one record.
+            growth, *others = [before[name] for name in names if name in before] or [
                 Growth(sheet.columns if sheet.closed else 0)
             ]
             for other in others:
-                first.join(other)
+                growth.join(other)
             if not track.held:
                 assert zone.sum_x is not None
                 assert zone.sum_y is not None
-                first.take(Moments(zone.area_cells, zone.sum_x, zone.sum_y), self._time_us)
-            first.moved |= not parted.isdisjoint(names)
-            self._growths[track.id] = first
-            x_mm, y_mm, variance, first.moved = places.of(first, *place(zone), zone.area_cells)
+                growth.take(Moments(zone.area_cells, zone.sum_x, zone.sum_y), self._time_us)
+            growth.moved |= not parted.isdisjoint(names)
+            self._growths[track.id] = growth
+            x_mm, y_mm, variance, growth.moved = places.of(growth, *place(zone), zone.area_cells)
             if self._around_mm is not None:
                 x_mm %= self._around_mm
             covariance = ((variance, 0.0), (0.0, variance))
-            found.append(dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance, moved=first.moved))
+            found.append(
+                dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance, moved=growth.moved)
+            )
         return found
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:

@@ -13,16 +13,19 @@ Found = dict[Case, list[Mean]]
 
 SETTLED = -1
 
+WORST = "30 %"
+
 
 def compute() -> Found:
     return scores.measured()
 
 
 def places_table(found: Found) -> writer.Table:
-    """Worst first."""
+    """Worst first. The page shows the worst condition alone."""
     head = ("touches", "number", "barycenter, mm", "place, mm", "place over barycenter, %", "within the ellipse, %")
     worst = sorted(GROWING, key=lambda case: -found[case][SETTLED].ratio)
-    return writer.Table(head, [(case.title, *_cells(found[case][SETTLED])) for case in worst])
+    rows = [(case.title, *_cells(found[case][SETTLED])) for case in worst]
+    return writer.Table(head, rows, lambda row: "," not in row[0] or WORST in row[0])
 
 
 def _cells(one: Mean) -> tuple[str, ...]:

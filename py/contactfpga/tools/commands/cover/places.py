@@ -16,12 +16,8 @@ def add_flags(flag: flags.Flags) -> None:
     flag("[SKIN]", "TOML file of a Skin with a table [cover].")
     flags.kit(flag)
     flags.output(flag, "Write the table to this TOML file; Places.load() reads it.", default="places.toml")
-    flag(
-        "--touches N",
-        "Simulated touches of each family: fingers, forearms and edges.",
-        numbers.whole(100, 100_000),
-        1000,
-    )
+    touches = "Simulated touches of each family: fingers, forearms and edges."
+    flag("--touches N", touches, numbers.whole(100, 100_000), 1000)
     flag("--seed N", "Seed of the touches.", numbers.SEED, 0)
 
 
