@@ -112,3 +112,7 @@ def test_contacts_that_meet_have_the_cells_of_both():
     around.take(moments([*CELLS[:2], (3, 8)]), 5000)
     assert around.closings == [*one.closings, closing(4000, (3, 8))]
     assert np.sum([each.closed for each in around.closings], axis=0).tolist() == list(moments([*CELLS[:2], (3, 8)]))
+    assert not around.moved
+    other.moved = True
+    around.join(other)
+    assert around.moved

@@ -62,9 +62,9 @@ def draw(folder: Path, found: Found) -> Path:
         axes = figure.subplots()
         for (title, errors), color in zip(lines.items(), (style.GRAY, *style.PALETTE)):
             axes.plot(AFTER_MS, errors[:SETTLED], color=color, marker="o", ms=4, label=title)
-        axes.set(xscale="log", ylim=(0, None), xlabel="time since the first cell closed, ms", ylabel="mean error, mm")
+        axes.set(xscale="log", ylim=(0, 3.6), xlabel="time since the first cell closed, ms", ylabel="mean error, mm")
         axes.set_xticks(AFTER_MS, [f"{after:g}" for after in AFTER_MS])
         axes.minorticks_off()
         axes.grid(True)
-        axes.legend()
+        axes.legend(ncols=2)
         return style.save(figure, folder / "order.svg")
