@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from contactfpga.shipped import examples
     from contactfpga.skin import Skin, SkinError
     from contactfpga.skin.sheet import Sheet
+    from contactfpga.tracking.places import Places
     from contactfpga.tracking.tracker import Tracker
     from contactfpga.tracking.tracks import Event, Track, Tracks
     from contactfpga.wire.faults import Faults, SelfTestSlot
@@ -75,6 +76,7 @@ __all__ = [
     "NoData",
     "NoSuchCommand",
     "OnlyNoise",
+    "Places",
     "PortBusy",
     "PortLost",
     "PortNotFound",
@@ -120,6 +122,7 @@ _NAMES = {
     "shipped": "examples",
     "skin": "Skin SkinError",
     "skin.sheet": "Sheet",
+    "tracking.places": "Places",
     "tracking.tracker": "Tracker",
     "tracking.tracks": "Event Track Tracks",
     "wire.faults": "Faults SelfTestSlot",

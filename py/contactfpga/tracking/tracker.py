@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,8 +10,10 @@ from typing import NamedTuple
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
+from contactfpga.tracking.growth import Growth, Moments
+from contactfpga.tracking.places import Places
 from contactfpga.tracking.spot import SAME_S, Member, Spot, error_mm2, place, radius_mm, rank
-from contactfpga.tracking.tracks import Event, Kind, Tracks
+from contactfpga.tracking.tracks import Event, Kind, Track, Tracks
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
 
@@ -38,11 +41,19 @@ class Tracker:
 
     ``gate_mm``: largest distance of a contact from its expected or last place. ``hold_ms``: time for which a contact
     without a zone is held, to survive a bounce. ``shared_ms``: time for which a contact that shares a zone is kept
-    while the zone is only as large as the others. ``move_mm``: distance between ``move`` events. Raises ValueError for
-    a setting outside its limits.
+    while the zone is only as large as the others. ``move_mm``: distance between ``move`` events. ``places``: table by
+    which contacts get :attr:`Track.place_mm`. Raises ValueError for a setting outside its limits.
     """
 
-    def __init__(self, gate_mm: float = 20.0, *, hold_ms: float = 5.0, shared_ms: float = 300.0, move_mm: float = 5.0):
+    def __init__(
+        self,
+        gate_mm: float = 20.0,
+        *,
+        hold_ms: float = 5.0,
+        shared_ms: float = 300.0,
+        move_mm: float = 5.0,
+        places: Places | None = None,
+    ):
         for name, value in {"gate_mm": gate_mm, "hold_ms": hold_ms, "shared_ms": shared_ms, "move_mm": move_mm}.items():
             low, high, unit = LIMITS[name]
             if not is_finite(value) or not low <= value <= high:
@@ -55,13 +66,15 @@ class Tracker:
         self._around_mm: float | None = None
         self._spots: list[Spot] = []
         self._events: list[Event] = []
+        self._places = places
+        self._growths: dict[int, Growth] = {}
 
     def update(self, zones: Zones) -> Tracks:
         """The contacts and events after a frame.
 
         A frame flagged ``mismatch`` changes nothing; one flagged ``overflow`` ends no contact, nor do lost frames. A
         frame that is older than the last one, or of another sheet, begins a new history. Raises TypeError for anything
-        but a frame.
+        but a frame, and ValueError for a sheet whose contacts the table of places cannot place.
         """
         if not isinstance(zones, Zones):
             raise TypeError(f"update() takes a frame of zones, such as board.next() returns; it got {shown(zones)}")
@@ -72,6 +85,8 @@ class Tracker:
             spot.held = True  # until a zone of this frame is its own
         unsure = [] if "mismatch" in zones.flags else self._step(zones)
         active = sorted((spot.track() for spot in self._spots), key=lambda track: track.id)
+        if self._places is not None:
+            active = self._placed(self._places, active)
         return Tracks(self._time_us, tuple(active), tuple(self._events), tuple(unsure), restarted)
 
     # ---- one frame
@@ -84,6 +99,9 @@ class Tracker:
             for spot in self._spots:
                 self._end(spot)
             self._spots = []
+            self._growths = {}
+        if self._places is not None:
+            self._places.check(zones.sheet)
         self._sheet = zones.sheet
         radius_mm = zones.sheet.radius_mm
         self._around_mm = None if radius_mm is None else 2 * math.pi * radius_mm
@@ -110,6 +128,43 @@ class Tracker:
         for zone in free:
             self._spots.append(Spot(zone, self._time_us, [self._begin(zone)]))
         return unsure
+
+    def _placed(self, places: Places, active: list[Track]) -> list[Track]:
+        """The contacts with their places by the order in which their cells closed."""
+        sheet, before, found = self._sheet, self._growths, []
+        assert sheet is not None
+        # Of a zone that parted nobody knows which cells went; one beside a zone that kept its cells is new.
+        areas = {track.id: track.zone.area_cells for track in active}
+        parted = {
+            name
+            for event in self._events
+            if event.kind in ("split", "down")
+            and any(areas.get(one, 0) < before[one].now.cells for one in event.parents if one in before)
+            for name in (event.id, *event.parents)
+        }
+        self._growths = {}
+        for track in active:
+            zone, names = track.zone, (track.id, *track.merged)
+            # Contacts of one zone have one record.
+            growth, *others = [before[name] for name in names if name in before] or [
+                Growth(sheet.columns if sheet.closed else 0)
+            ]
+            for other in others:
+                growth.join(other)
+            if not track.held:
+                assert zone.sum_x is not None
+                assert zone.sum_y is not None
+                growth.take(Moments(zone.area_cells, zone.sum_x, zone.sum_y), self._time_us)
+            growth.moved |= not parted.isdisjoint(names)
+            self._growths[track.id] = growth
+            x_mm, y_mm, variance, growth.moved = places.of(growth, *place(zone), zone.area_cells)
+            if self._around_mm is not None:
+                x_mm %= self._around_mm
+            covariance = ((variance, 0.0), (0.0, variance))
+            found.append(
+                dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance, moved=growth.moved)
+            )
+        return found
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:
         spots = self._spots

@@ -37,6 +37,14 @@ class Track:
     a zone that winds around the sheet may hide it."""
     merged: tuple[int, ...] = ()
     """Ids of smaller contacts in the same zone; each gets its own zone when they part."""
+    place_mm: tuple[float, float] | None = None
+    """Place by the order and times in which the cells closed (docs/tracking.md); the zone's barycenter where these say
+    nothing. None without a table of places."""
+    place_cov_mm2: tuple[tuple[float, float], tuple[float, float]] | None = None
+    """Covariance of :attr:`place_mm`."""
+    moved: bool = False
+    """With a table of places: whether the contact slid, rolled or parted, so that :attr:`place_mm` is the
+    barycenter."""
 
     def to_dict(self) -> dict[str, object]:
         """All values as plain Python objects for JSON."""
@@ -51,7 +59,10 @@ class Track:
             "seen_us": self.seen_us,
             "held": self.held,
             "merged": list(self.merged),
-        }
+        } | ({} if self.place_mm is None else self._place())
+
+    def _place(self) -> dict[str, object]:
+        return {"place_mm": self.place_mm, "place_cov_mm2": self.place_cov_mm2, "moved": self.moved}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

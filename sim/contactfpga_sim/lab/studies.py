@@ -179,6 +179,19 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "order",
+        title="Places by the order in which cells close",
+        page="tracking.md",
+        minutes=2,
+        sections=tables(
+            order_places=Section("tables:places_table"),
+            order_times=Section("tables:times_table"),
+            order_moves=Section("tables:moves_table"),
+        ),
+        compute="tables:compute",
+        pictures="tables:draw",
+    ),
+    Study(
         "performance",
         title="Latency, rate and clocks of the gateware",
         page="performance.md",

@@ -15,6 +15,7 @@ TOPICS = {
     "impact": "Compute compression, time and peak force when an arm runs into something.",
     "sense": "Compute the force that closes a switch under the cover, or how far a force reaches.",
     "felt": "Compute how light a finger a Skin's sheet feels, anywhere on it.",
+    "places": "Fit the table by which a tracker places contacts by the order in which cells close.",
     "design": "Find material, thickness and pitch for an arm, a switch and limits.",
     "figures": "Draw the paper's curves, the impact over time and the design map.",
 }

@@ -41,6 +41,19 @@ def add_flags(flag: flags.Flags) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    skin, laid = sheet_and_cover(args)
+    found = touches.feel(
+        *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed),
+        BODIES[args.body],
+    )
+    unsolved = any(isinstance(force, NoSolution) for force in (found.half, found.most, found.worst))
+    answer = {"finger": {"body": args.body, "length_m": args.length, "width_m": args.width}} | vars(found)
+    results.show(args, answer, lambda: _print(found, laid, args))
+    return UNSOLVED if unsolved else 0
+
+
+def sheet_and_cover(args: argparse.Namespace) -> tuple[Skin, Cover]:
+    """The Skin of the file or kit, and its cover; raises :class:`CoverError` for one that knows no force."""
     args.skin = flags.sheet_file(args)
     if args.skin is None:
         raise CoverError(f"name a Skin's file, or a kit: --kit {' or --kit '.join(kits.names())}")
@@ -51,14 +64,7 @@ def run(args: argparse.Namespace) -> int:
             f"{args.skin} {what}, so any touch of a switch closes it, whatever its force; "
             "give [cover] with a model that goes by stress, as examples/tiles.toml does"
         )
-    found = touches.feel(
-        *(laid, _sheet(skin), args.length, args.width, args.places, args.acceleration, args.foam_density, args.seed),
-        BODIES[args.body],
-    )
-    unsolved = any(isinstance(force, NoSolution) for force in (found.half, found.most, found.worst))
-    answer = {"finger": {"body": args.body, "length_m": args.length, "width_m": args.width}} | vars(found)
-    results.show(args, answer, lambda: _print(found, laid, args))
-    return UNSOLVED if unsolved else 0
+    return skin, laid
 
 
 def _sheet(skin: Skin) -> Sheet:

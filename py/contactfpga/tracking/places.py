@@ -1,0 +1,142 @@
+"""Places of contacts by the times at which their cells closed.
+
+A body that is pressed in at its middle closes the cells there first. Of n cells, the one that closed at the share s of
+the time between the first closing and the last has the weight
+
+    1/n (1 + f(s) - mean of f),    f(s) = linear s + square s^2,
+
+in the place, where the barycenter gives each 1/n. The factors are fitted for each n to touches with a known place
+(``contactfpga cover places``). Cells that closed together have one weight, so their sums are enough. Where the times
+say nothing, the place is the barycenter: the contact moved, or its cells closed so fast one after another that only the
+spread of their forces told which was first, as under a flat and hard body.
+"""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import is_finite, shown
+from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking.growth import Growth
+
+MOST_ROWS = 100
+
+
+class PlacesError(ContactFPGAError, ValueError):
+    """A table of places that cannot be used."""
+
+
+class PlaceEstimate(NamedTuple):
+    """A contact's place in mm, and the variance along each axis in mm2, of which 5.99 times the whole is the square of
+    the radius that holds 95 % of the errors."""
+
+    x_mm: float
+    y_mm: float
+    variance_mm2: float
+    moved: bool = False
+    """Whether the contact did more than grow in place."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """Factors for zones of at least so many cells."""
+
+    cells: int
+    linear: float
+    square: float
+    place_mm2: float
+    """Variance of the place along each axis."""
+    barycenter_mm2: float
+    """Variance of the barycenter along each axis."""
+    reach_mm: float
+    """Largest distance of the place from the barycenter. Farther, and the contact moved as it grew."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Places:
+    """A table that places contacts by the order in which their cells close, fitted to a sheet and its cover
+    (docs/tracking.md).
+
+    >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    >>> from contactfpga.tracking.places import Row
+    >>> row = Row(cells=1, linear=-2.0, square=0.5, place_mm2=0.5, barycenter_mm2=1.5, reach_mm=3.0)
+    >>> places = contactfpga.Places(10.0, 10.0, least_us=200.0, rows=(row,))
+    >>> contactfpga.Tracker(places=places).update(zones).active[0].place_mm
+    (55.0, 75.0)
+    """
+
+    pitch_x_mm: float
+    pitch_y_mm: float
+    least_us: float
+    """Mean time between closings below which the times say nothing."""
+    rows: tuple[Row, ...]
+    """By rising number of cells, from 1 on."""
+
+    def __post_init__(self) -> None:
+        numbers = [(name, getattr(self, name)) for name in ("pitch_x_mm", "pitch_y_mm", "least_us")]
+        numbers += [(name, value) for row in self.rows for name, value in vars(row).items()]
+        for name, value in numbers:
+            least = None if name in ("linear", "square") else 0
+            if not is_finite(value) or abs(value) > 1e9 or (least is not None and value < least):
+                limits = "-1e9 to 1e9" if least is None else "0 to 1e9"
+                raise PlacesError(f"{name} is {shown(value)}; it must be a number from {limits}")
+        counts = [row.cells for row in self.rows[: MOST_ROWS + 1]]
+        if not 1 <= len(counts) <= MOST_ROWS or counts[0] != 1 or sorted(set(counts)) != counts:
+            raise PlacesError(f"the rows are for {shown(counts)} cells; there must be 1 to {MOST_ROWS}, rising from 1")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Places:
+        """The table that ``contactfpga cover places`` wrote. Raises :class:`PlacesError`, OSError."""
+        values = tomlfile.fields_of(cls, "places", tomlfile.load(path, PlacesError), PlacesError)
+        rows = values.get("rows")
+        try:
+            made = tuple(Row(**tomlfile.fields_of(Row, "rows", row, PlacesError)) for row in rows)  # type: ignore[union-attr]
+            return cls(**{**values, "rows": made})
+        except TypeError:
+            raise PlacesError(f"{path} lacks a value; write it again with contactfpga cover places") from None
+        except PlacesError as error:
+            raise PlacesError(f"{path}: {error}") from None
+
+    def toml(self) -> str:
+        """The text that :meth:`load` reads."""
+        heads = "".join(f"{name} = {getattr(self, name):g}\n" for name in ("pitch_x_mm", "pitch_y_mm", "least_us"))
+        rows = ("".join(f"{name} = {value:.6g}\n" for name, value in vars(row).items()) for row in self.rows)
+        return heads + "".join(f"\n[[rows]]\n{row}" for row in rows)
+
+    def check(self, sheet: Sheet) -> None:
+        """Raises :class:`PlacesError` for a sheet whose contacts the table cannot place."""
+        if sheet.report == "barycenter":
+            raise PlacesError("report is 'barycenter', which loses the sums of a zone's cells; take report = 'moments'")
+        own, there = ((one.pitch_x_mm, one.pitch_y_mm) for one in (self, sheet))
+        if not all(math.isclose(one, other, rel_tol=1e-3) for one, other in zip(own, there)):
+            pitches = "{:g} x {:g} mm; the sheet has {:g} x {:g} mm".format(*own, *there)
+            raise PlacesError(f"the table of places is for {pitches}; fit one with contactfpga cover places")
+
+    def of(self, growth: Growth, x_mm: float, y_mm: float, cells: int) -> PlaceEstimate:
+        """The place of a contact that grew to a zone of so many cells with this barycenter."""
+        closings = growth.closings
+        recorded = sum(one.closed.cells for one in closings)
+        barycenter = PlaceEstimate(x_mm, y_mm, self._row(cells).barycenter_mm2, growth.moved)
+        if growth.moved or growth.shrinks or growth.span_us <= self.least_us * (recorded - 1):
+            return barycenter
+        row = self._row(recorded)
+        shares = [(one.time_us - closings[0].time_us) / growth.span_us for one in closings]
+        factors = [share * (row.linear + row.square * share) for share in shares]
+        mean = sum(one.closed.cells * factor for one, factor in zip(closings, factors)) / recorded
+        weights = [(factor - mean) / recorded for factor in factors]
+        dx_mm = self.pitch_x_mm * sum(one.closed.sum_x * weight for one, weight in zip(closings, weights))
+        dy_mm = self.pitch_y_mm * sum(one.closed.sum_y * weight for one, weight in zip(closings, weights))
+        if math.hypot(dx_mm, dy_mm) > row.reach_mm:
+            return barycenter._replace(moved=True)
+        x = sum(one.closed.sum_x for one in closings) / recorded
+        y = sum(one.closed.sum_y for one in closings) / recorded
+        return PlaceEstimate(self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, row.place_mm2)
+
+    def _row(self, cells: int) -> Row:
+        return self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]
