@@ -5,7 +5,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from contactfpga_sim.lab.cover.elements import Block, touching
 from tracker_frames import moments, pressed
 
 from contactfpga import Places, Skin, Tracker
@@ -13,6 +12,7 @@ from contactfpga.design import kits
 from contactfpga.design.cover import load_cover, medium
 from contactfpga.tracking.places import PlacesError, Row
 from contactfpga_sim.apps import places
+from contactfpga_sim.lab.cover.elements import Block, touching
 from contactfpga_sim.lab.order import scores
 
 SKIN = Skin(pitch_x_mm=6.0, pitch_y_mm=8.0, connectivity=4)

@@ -145,10 +145,10 @@ def _row(first: int, end: int, least_us: float, grew: list[Draw]) -> Row | None:
     if first <= TOO_FEW or not told.any():
         return Row(first, 0.0, 0.0, _variance(off), _variance(off), 0.0)
     flat = moves[told].transpose(0, 2, 1).reshape(-1, 2)
-    factors = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0]
+    linear, square = factors = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0]
     moved = factors @ moves[told]
     reach_mm = float(np.quantile(np.hypot(*moved.T), FARTHEST))
-    return Row(first, *factors.tolist(), _variance(off[told] - moved), _variance(off), reach_mm)
+    return Row(first, float(linear), float(square), _variance(off[told] - moved), _variance(off), reach_mm)
 
 
 def _variance(off: Floats) -> float:

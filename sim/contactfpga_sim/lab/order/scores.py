@@ -159,8 +159,8 @@ def judged(tracks: Tracks, there: list[Place]) -> list[Outcome]:
         if math.dist(_middle(track), place) <= min(math.dist(_middle(track), other) for other in there):
             assert track.place_mm is not None
             assert track.place_cov_mm2 is not None
-            errors = [math.dist(at, place) for at in (track.place_mm, _middle(track))]
-            found.append(Outcome(*errors, _covered(errors[0], track.place_cov_mm2[0][0]), track.moved))
+            error, barycenter = (math.dist(at, place) for at in (track.place_mm, _middle(track)))
+            found.append(Outcome(error, barycenter, _covered(error, track.place_cov_mm2[0][0]), track.moved))
     return found
 
 
