@@ -38,7 +38,7 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
         last = known.settle + 2 if rng.random() < 0.1 else 1 + known.settle // 2
         fall = np.where(broken, known.row_clocks, rng.integers(0, last, skin.columns))
         for clock in (-1, *sorted({*fall.tolist()})):
-            gone = {column: skin.rows for column in np.flatnonzero(fall > clock).tolist()}
+            gone = dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows)
             cuts[max(1, start + clock)] = Cuts({}, gone)
         for slot in range(1, known.row_lines):
             at = start + slot * known.row_clocks

@@ -81,9 +81,7 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
     return result
 
 
-def _instants(
-    facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int
-) -> list[tuple[int, bool]]:
+def _instants(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[tuple[int, bool]]:
     """By frame the clocks by which samples precede the settle time's end, and whether rows are checked."""
     slots = [row_slots(facts, frame)[0] for frame in range(count)]
     if not facts.skin.ruler:
@@ -95,7 +93,9 @@ def _instants(
         asked = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
         level = asked[-1] if asked and 1 <= asked[-1] <= 255 else facts.skin.ruler
         ignored = lines.open_columns | facts.mask.all(axis=0)
-        fallen = next((clocks for clocks in range(1, facts.settle + 1) if _fell(facts, timeline, start + clocks - 1, ignored)), 0)
+        fallen = next(
+            (clocks for clocks in range(1, facts.settle + 1) if _fell(facts, timeline, start + clocks - 1, ignored)), 0
+        )
         instant = max(facts.first_sample, fallen * level // 16) if fallen else facts.settle
         found.append((max(0, facts.settle - instant), not fallen or level >= 24))
         lines.check("columns", ~_read(facts, timeline, slot - 1)[: facts.columns], _renews(facts, frame))

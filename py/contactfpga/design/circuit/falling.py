@@ -1,0 +1,149 @@
+"""Charged columns that fall through resistive cells: the instant of a sample is a threshold of resistance.
+
+A column's charge leaves through its cell, a diode and the selected row; the pin's leakage and the diodes of pressed
+cells in other rows, which are held at the supply, add and subtract. The time to the pin's threshold is an integral over
+the cell's current: dV = (R + n kT/q / (I + Is)) dI. Cells of a row that fall together share the row's resistance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from contactfpga.design.circuit.network import PF, charge
+from contactfpga.design.circuit.values import THERMAL_V, Circuit, CircuitError, Falling
+from contactfpga.skin import Skin
+
+STEPS, ROUNDS = 60, 12
+SIXTEENTHS = 16
+COLD_C, USUAL_C, HOT_C = -20.0, 27.0, 70.0
+GRID_OHM = np.geomspace(200.0, 2e6, 61)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Corner:
+    """Conditions under which columns fall."""
+
+    celsius: float = USUAL_C
+    threshold_v: float = 0.0
+    """Difference from the usual threshold."""
+    leak_a: float = 0.0
+    """Current that a pin takes out of its column; below 0 it feeds it."""
+    tolerance: float = 0.0
+    """Relative difference of the column's capacitor."""
+    together: int = 1
+    """Columns that fall at once in the selected row."""
+    others: int = 0
+    """Pressed cells of the column in other rows."""
+    beside: int = 0
+    """Neighboring columns that fell earlier, 0 to 2; of a row that falls together none."""
+
+
+def parts(circuit: Circuit) -> Falling:
+    """The circuit's columns. Raises :class:`CircuitError` if they do not fall."""
+    if circuit.falling is None:
+        raise CircuitError("there is no [circuit.falling]; it states how columns fall through resistive cells")
+    return circuit.falling
+
+
+def fall_s(circuit: Circuit, ohm: np.ndarray | float, rows: int, corner: Corner | None = None) -> np.ndarray:
+    """Seconds in which a column falls to its pin's threshold through a cell of ``ohm``, on a sheet of ``rows``;
+    infinite if it never does."""
+    corner, falling = corner or Corner(), parts(circuit)
+    diode, resistance = circuit.diode.at(corner.celsius), np.atleast_1d(np.asarray(ohm, float))
+    step, saturation = diode.emission * THERMAL_V, diode.saturation_a
+    end_v = falling.threshold_v + corner.threshold_v
+    beside_pf = 2 * circuit.neighbor_pf
+    column_pf = falling.column_pf * (1 + corner.tolerance) + circuit.line_pf + rows * circuit.crossing_pf
+    farads = PF * (column_pf + beside_pf * (corner.together == 1))
+    reverse = np.array([0.0, end_v - circuit.supply_v])
+    farads += corner.others * np.diff(charge(diode, reverse)[0])[0] / (end_v - circuit.supply_v)
+    rest_v = step * math.log1p(1e-6 / saturation)  # of neighbors that have fallen, about
+    pulled_v = PF * circuit.neighbor_pf * corner.beside * (circuit.supply_v - rest_v) / farads
+    start_v = circuit.supply_v - pulled_v - PF * circuit.crossing_pf * circuit.supply_v / farads
+    whole = resistance + diode.series_ohm + corner.together * circuit.drive_ohm
+    first, last = (_amperes(volts, whole, step, saturation) for volts in (end_v, start_v))
+    amperes = np.geomspace(first, last, STEPS)
+    volts = amperes * whole + step * np.log1p(amperes / saturation)
+    upward = (circuit.supply_v - volts) / circuit.column_pull_ohm + corner.others * saturation - corner.leak_a
+    out = amperes - upward
+    slope = (whole + step / (amperes + saturation)) * amperes / np.where(out > 0, out, np.nan)
+    middle = (slope[1:] + slope[:-1]) / 2 * np.diff(np.log(amperes), axis=0)
+    return np.asarray(np.nan_to_num(farads * middle.sum(axis=0), nan=np.inf))
+
+
+def _amperes(volts: float, ohm: np.ndarray, step: float, saturation: float) -> np.ndarray:
+    """Current at which resistance and junction take these volts, by Newton's method from above."""
+    x = np.minimum(volts / step, np.log1p(volts / (ohm * saturation)))
+    for _ in range(ROUNDS):
+        grown = saturation * ohm * np.exp(x)
+        x -= (grown - saturation * ohm + step * x - volts) / (grown + step)
+    return np.asarray(saturation * np.expm1(x))
+
+
+def ruler_s(circuit: Circuit, rows: int, columns: int, corner: Corner | None = None) -> float:
+    """Seconds in which the columns fall together through the ruler."""
+    alone = dataclasses.replace(corner or Corner(), together=columns, others=0, beside=0)
+    return float(fall_s(circuit, parts(circuit).ruler_ohm, rows, alone)[0])
+
+
+def read_ohm(circuit: Circuit, rows: int, seconds: float, corner: Corner | None = None) -> float:
+    """The largest resistance of a cell that reads pressed at this instant; 0 if none does, infinite if all do."""
+    times = fall_s(circuit, GRID_OHM, rows, corner)
+    ends = float(np.interp(math.log(seconds), np.log(times), np.log(GRID_OHM), -math.inf, math.inf))
+    return math.exp(ends)
+
+
+def corners(circuit: Circuit, rows: int, columns: int, leak_ua: float) -> Iterator[tuple[Corner, Corner]]:
+    """The ruler's slowest column and a cell's, at all corners of temperature, threshold, leakage, capacitor and pressed
+    neighbors. Temperature and threshold are those of both; leakage and capacitor are each column's own."""
+    falling = parts(circuit)
+    worst = leak_ua * 1e-6
+    spread = falling.threshold_spread_v
+    patterns = ({}, {"together": columns}, {"together": columns, "others": rows - 1}, {"beside": 2})
+    for celsius, threshold, leak, other, end, pattern in itertools.product(
+        (COLD_C, USUAL_C, HOT_C), (-spread, 0.0, spread), (-worst, worst), (-worst, worst), (-1, 1), patterns
+    ):
+        shared = {"celsius": celsius, "threshold_v": threshold}
+        ruler = Corner(**shared, leak_a=other, tolerance=falling.tolerance)
+        yield ruler, Corner(**shared, leak_a=leak, tolerance=end * falling.tolerance, **pattern)  # type: ignore[arg-type]
+
+
+def error_octaves(circuit: Circuit, rows: int, columns: int, ohm: float, leak_ua: float, ruled: bool = True) -> float:
+    """Largest deviation of the resistance that reads pressed, in octaves, over all :func:`corners` with this leakage:
+    of a sample at which a cell of ``ohm`` usually does, as a multiple of the ruler's time or, not ``ruled``, at its
+    usual instant."""
+    usual_s = float(fall_s(circuit, ohm, rows)[0])
+    multiple = usual_s / ruler_s(circuit, rows, columns)
+    found = []
+    for ruler, cell in corners(circuit, rows, columns, leak_ua):
+        seconds = multiple * ruler_s(circuit, rows, columns, ruler) if ruled else usual_s
+        read = read_ohm(circuit, rows, seconds, cell) if math.isfinite(seconds) else math.inf
+        found.append(abs(math.log2(read / ohm)) if read else math.inf)
+    return max(found)
+
+
+def sixteenths(circuit: Circuit, skin: Skin, ohm: float) -> int:
+    """``ruler`` of a Skin at which a cell of ``ohm`` usually just reads pressed; below 1 or above 255 there is none."""
+    usual = fall_s(circuit, ohm, skin.row_lines)[0] / ruler_s(circuit, skin.row_lines, skin.column_lines)
+    return round(float(min(usual * SIXTEENTHS, 1e6)))
+
+
+def check(circuit: Circuit, skin: Skin) -> None:
+    """Raise :class:`CircuitError` if a Skin's columns cannot fall, or the settle time is too short for its sample."""
+    if not skin.ruler:
+        raise CircuitError("ruler is 0; [circuit.falling] needs a Skin with a ruler, such as ruler = 16")
+    lines = skin.row_lines, skin.column_lines
+    most_us = max(1e6 * ruler_s(circuit, *lines, ruler) for ruler, _ in corners(circuit, *lines, 0.0))
+    if math.isinf(most_us):
+        raise CircuitError(
+            f"columns do not fall through ruler_ohm = {parts(circuit).ruler_ohm:g}: column_pull_ohm = "
+            f"{circuit.column_pull_ohm:g} or hot diodes feed them; leave that resistor out (1e8), with silicon diodes"
+        )
+    if (needed_us := most_us * max(skin.ruler, SIXTEENTHS) / SIXTEENTHS) > skin.settle_us:
+        late = f"with ruler = {skin.ruler} the latest sample comes after {needed_us:.1f} us"
+        raise CircuitError(f"settle_us is {skin.settle_us:g}; {late}")

@@ -1,0 +1,100 @@
+"""Fall times through resistive cells against ngspice on extracted lines, and what a Skin's file states.
+
+What only this kills: a cell's time off by more than 5 % (0.07 octaves) over temperature, leakage and neighbors, a ruler
+that does not track, and a level that a pull or hot diodes hold up.
+"""
+
+import numpy as np
+import pytest
+
+from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, CircuitError, Falling, falling, load_checked, phases
+from contactfpga.design.circuit.falling import Corner
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
+from contactfpga.design.sheet import extract
+from contactfpga.design.sheet.layout import lay_out
+from contactfpga.skin import Skin
+from contactfpga_sim.model.sheet import agreement
+
+SIZE, ROW = 8, 4
+STATED = Circuit(falling=Falling(), column_pull_ohm=1e8, diode=SILICON, series_ohm=33.0)
+
+
+def extracted() -> Circuit:
+    """Lines of an 8x8 sheet as its layout has them."""
+    return extract.extracted(lay_out(Skin(rows=SIZE, columns=SIZE), STATED)).circuit
+
+
+def spice_s(circuit: Circuit, ohm: np.ndarray, column: int, corner: Corner, most_s: float) -> float:
+    """Time of ngspice from selecting the middle row until the column is at the pin's threshold."""
+    network = Network(circuit, np.isfinite(ohm), ohm=ohm)
+    phase = phases.settle(network, Levels.of(circuit))
+    seconds, volts = agreement.run(phase, most_s, 4000, corner.celsius, corner.leak_a)
+    return float(np.interp(-circuit.falling.threshold_v, -volts[:, column], seconds))
+
+
+PATTERNS = {
+    "one cell": {},
+    "a row": {"together": SIZE},
+    "a sheet": {"together": SIZE, "others": SIZE - 1},
+    "neighbors": {"beside": 2},
+}
+
+
+@pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
+@pytest.mark.parametrize("ohm", [5_000.0, 44_000.0, 150_000.0])
+@pytest.mark.parametrize("name", PATTERNS)
+@pytest.mark.parametrize(("celsius", "leak_a"), [(27.0, 0.0), (-20.0, 1e-6), (70.0, -1e-6), (70.0, 1e-6)])
+def test_a_column_falls_as_in_ngspice(name, ohm, celsius, leak_a):
+    circuit = extracted()
+    cells = np.full((SIZE, SIZE), np.inf)
+    if "others" in PATTERNS[name]:
+        cells[:] = ohm
+    elif name != "one cell":
+        cells[ROW, :] = ohm if name == "a row" else np.inf
+    if name == "neighbors":
+        cells[ROW, [2, 4]] = ohm / 50
+    cells[ROW, 3] = ohm
+    corner = Corner(celsius=celsius, leak_a=leak_a, **PATTERNS[name])
+    ours = float(falling.fall_s(circuit, ohm, SIZE, corner)[0])
+    within = 0.035 if "beside" in PATTERNS[name] and ohm < 10_000 else 0.005  # neighbors that are still falling
+    assert spice_s(circuit, cells, 3, corner, 1.3 * ours) == pytest.approx(ours, rel=within)
+
+
+def test_a_light_level_holds_by_the_ruler_alone_and_with_silicon_diodes_alone():
+    """Worst corner of -20 to 70 degrees Celsius, thresholds from 1.1 to 1.7 V, capacitors of 5 %."""
+    circuit = extracted()
+    assert falling.error_octaves(circuit, 17, 17, 44_000, leak_ua=1.0) < 0.3
+    assert falling.error_octaves(circuit, 17, 17, 44_000, leak_ua=1.0, ruled=False) > 0.7
+    assert falling.error_octaves(circuit, 17, 17, 44_000, leak_ua=10.0) > 1.0
+    assert falling.error_octaves(circuit.replace(diode=SCHOTTKY), 17, 17, 44_000, leak_ua=1.0) > 1.0
+    assert falling.read_ohm(circuit, 17, float(falling.fall_s(circuit, 9e4, 17)[0])) == pytest.approx(9e4, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changes", "skin", "message"),
+    [
+        ("column_pull_ohm = 47_000", "", "columns do not fall through ruler_ohm = 25000: column_pull_ohm = 47000"),
+        ("column_pull_ohm = 1e8\ndiode = 'schottky'", "settle_us = 40", ""),
+        ("column_pull_ohm = 1e8", "settle_us = 10", "settle_us is 10; with ruler = 28 the latest sample comes after"),
+        ("column_pull_ohm = 1e8", "ruler = 0", "ruler is 0; [circuit.falling] needs a Skin with a ruler"),
+        ("column_pull_ohm = 1e8\nfalling.leak_ua = -1", "", "leak_ua in [circuit.falling] is -1; it must lie between"),
+        ("column_pull_ohm = 1e8\nfalling.ohm = 1", "", "unknown key 'ohm' in [circuit.falling]"),
+    ],
+)
+def test_a_file_whose_columns_cannot_fall_is_refused(tmp_path, changes, skin, message):
+    stated = {"guard": "true", "precharge_us": "0.5", "ruler": "28", "settle_us": "40"}
+    stated |= dict([skin.split(" = ")] if skin else [])
+    text = "".join(f"{name} = {value}\n" for name, value in stated.items())
+    path = tmp_path / "skin.toml"
+    path.write_text(
+        f"{text}[circuit]\ndiode = 'silicon'\n{changes}\nfalling.column_pf = 220\n".replace(
+            "diode = 'silicon'\n", "" if "diode" in changes else "diode = 'silicon'\n"
+        )
+    )
+    if not message:
+        assert load_checked(path, Skin.load(path)).falling == Falling()
+        return
+    with pytest.raises(CircuitError) as caught:
+        load_checked(path, Skin.load(path))
+    assert message in str(caught.value)
