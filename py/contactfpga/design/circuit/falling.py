@@ -129,7 +129,7 @@ def error_octaves(circuit: Circuit, rows: int, columns: int, ohm: float, leak_ua
 
 def sixteenths(circuit: Circuit, skin: Skin, ohm: float) -> int:
     """``ruler`` of a Skin at which a cell of ``ohm`` usually just reads pressed; below 1 or above 255 there is none."""
-    usual = fall_s(circuit, ohm, skin.row_lines)[0] / ruler_s(circuit, skin.row_lines, skin.column_lines)
+    usual = fall_s(circuit, ohm, skin.row_lines)[0] / ruler_s(circuit, skin.row_lines, skin.columns)
     return round(float(min(usual * SIXTEENTHS, 1e6)))
 
 
@@ -137,7 +137,7 @@ def check(circuit: Circuit, skin: Skin) -> None:
     """Raise :class:`CircuitError` if a Skin's columns cannot fall, or the settle time is too short for its sample."""
     if not skin.ruler:
         raise CircuitError("ruler is 0; [circuit.falling] needs a Skin with a ruler, such as ruler = 16")
-    lines = skin.row_lines, skin.column_lines
+    lines = skin.row_lines, skin.columns
     most_us = max(1e6 * ruler_s(circuit, *lines, ruler) for ruler, _ in corners(circuit, *lines, 0.0))
     if math.isinf(most_us):
         raise CircuitError(
