@@ -70,10 +70,11 @@ def test_noise_and_edges_turn_as_many_readings_as_they_should():
     usual = [(1 + math.erf(-away / 2)) / 2 for away in (-2.0, -1.0, 0.0, 1.0)]
     assert pressed == pytest.approx(usual, abs=0.06)  # a clock is 0.4 of the noise's deviation
     assert (np.diff(pressed) < -0.02).all()
-    clocks[:-1, :-1] = 70.0
-    period_s, lasts_s = 73e-6, 20e-6
-    missed = 1 - read(clocks * CLOCK_S, 3_000, (0.0, -0.4, lasts_s, 1 / period_s)).mean()
-    assert missed == pytest.approx(lasts_s / period_s, abs=0.03)
+    clocks[:-1, :-1] = 87.0
+    for lasts_s, period_s in ((20e-6, 73e-6), (5e-6, 73e-6)):
+        missed = 1 - read(clocks * CLOCK_S, 1_500, (0.0, -0.06, lasts_s, 1 / period_s)).mean()
+        hit = lasts_s / period_s
+        assert hit * (1 - hit) - 0.05 < missed < hit + 0.02  # an edge at the ruler moves the sample beyond the next one
 
 
 @pytest.mark.slow

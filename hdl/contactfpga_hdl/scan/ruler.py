@@ -36,7 +36,8 @@ class Ruler:
         sum_ = Signal(range(self._most + MAX_RULER + 1), name="ruler_sum")
         step = Signal.like(self._asked, name="ruler_step")
         fell, late = Signal(name="ruler_fell"), Signal(name="ruler_late")
-        falls = (read | faulty | self._ignored).all() & read.any()
+        ignored = faulty | self._ignored
+        falls = (read | ignored).all() & (read & ~ignored).any()
         with m.If(starts):
             m.d.sync += [sum_.eq(self._asked), step.eq(self._asked), fell.eq(0), late.eq(0)]
         with m.Elif(of_guard):

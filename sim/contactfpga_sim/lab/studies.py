@@ -29,6 +29,17 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "cell",
+        title="Resistive cells read by the time in which a column falls",
+        page="cell.md",
+        minutes=1,
+        sections=tables(
+            materials=Section("tables:materials_table", sample="tables:materials_table"),
+            levels=Section("tables:levels_table", sample="tables:levels_table"),
+            wrong=Section("tables:wrong_table"),
+        ),
+    ),
+    Study(
         "chart",
         title="Speed against accuracy",
         page="chart.md",

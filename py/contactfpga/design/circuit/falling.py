@@ -91,11 +91,10 @@ def ruler_s(circuit: Circuit, rows: int, columns: int, corner: Corner | None = N
     return float(fall_s(circuit, parts(circuit).ruler_ohm, rows, alone)[0])
 
 
-def read_ohm(circuit: Circuit, rows: int, seconds: float, corner: Corner | None = None) -> float:
-    """The largest resistance of a cell that reads pressed at this instant; 0 if none does, infinite if all do."""
-    times = fall_s(circuit, GRID_OHM, rows, corner)
-    ends = float(np.interp(math.log(seconds), np.log(times), np.log(GRID_OHM), -math.inf, math.inf))
-    return math.exp(ends)
+def read_ohm(circuit: Circuit, rows: int, seconds: np.ndarray | float, corner: Corner | None = None) -> np.ndarray:
+    """The largest resistances of cells that read pressed at these instants; 0 if none does, infinite if all do."""
+    times = np.log(fall_s(circuit, GRID_OHM, rows, corner))
+    return np.asarray(np.exp(np.interp(np.log(seconds), times, np.log(GRID_OHM), -math.inf, math.inf)))
 
 
 def corners(circuit: Circuit, rows: int, columns: int, leak_ua: float) -> Iterator[tuple[Corner, Corner]]:
@@ -113,18 +112,19 @@ def corners(circuit: Circuit, rows: int, columns: int, leak_ua: float) -> Iterat
         yield ruler, Corner(**shared, leak_a=leak, tolerance=end * falling.tolerance, **pattern)  # type: ignore[arg-type]
 
 
-def error_octaves(circuit: Circuit, rows: int, columns: int, ohm: float, leak_ua: float, ruled: bool = True) -> float:
+def error_octaves(
+    circuit: Circuit, rows: int, columns: int, ohm: np.ndarray | float, leak_ua: float, ruled: bool = True
+) -> np.ndarray:
     """Largest deviation of the resistance that reads pressed, in octaves, over all :func:`corners` with this leakage:
-    of a sample at which a cell of ``ohm`` usually does, as a multiple of the ruler's time or, not ``ruled``, at its
-    usual instant."""
-    usual_s = float(fall_s(circuit, ohm, rows)[0])
-    multiple = usual_s / ruler_s(circuit, rows, columns)
-    found = []
+    of samples at which cells of ``ohm`` usually do, as multiples of the ruler's time or, not ``ruled``, at their usual
+    instants."""
+    usual_s = fall_s(circuit, ohm, rows)
+    ruler_usual_s, worst = ruler_s(circuit, rows, columns), np.zeros(usual_s.shape)
     for ruler, cell in corners(circuit, rows, columns, leak_ua):
-        seconds = multiple * ruler_s(circuit, rows, columns, ruler) if ruled else usual_s
-        read = read_ohm(circuit, rows, seconds, cell) if math.isfinite(seconds) else math.inf
-        found.append(abs(math.log2(read / ohm)) if read else math.inf)
-    return max(found)
+        share = ruler_s(circuit, rows, columns, ruler) / ruler_usual_s if ruled else 1.0
+        with np.errstate(divide="ignore"):
+            worst = np.maximum(worst, np.abs(np.log2(read_ohm(circuit, rows, usual_s * share, cell) / ohm)))
+    return worst
 
 
 def sixteenths(circuit: Circuit, skin: Skin, ohm: float) -> int:

@@ -98,7 +98,7 @@ class VirtualBoard:
             if cover is None or cover.cell is None:
                 raise ValueError("[circuit.falling] needs [cover.cell], whose resistance falls with the force")
             self._cells, parts = FallingSheet(self.skin, circuit, cover.cell), circuit.falling
-            noise, edge = (1e-3 * mv / circuit.supply_v for mv in (parts.noise_mv, parts.edge_mv))
+            noise, edge = (1e-3 * mv / circuit.supply_v for mv in (parts.noise_mv, -parts.edge_mv))
             self._board.disturb(noise, edge, 1e-6 * parts.edge_us, parts.edge_hz)
         elif circuit is not None:
             self._board.settle(*lines_of(circuit, self.skin))

@@ -105,7 +105,7 @@ def _instants(facts: Facts, timeline: Timeline, requests: Sequence[Request], cou
 def _fell(facts: Facts, timeline: Timeline, cycle: int, ignored: np.ndarray) -> bool:
     """Whether all columns that are not ``ignored``, and one at least, read pressed in the guard row's slot."""
     low = (closed(facts, timeline, cycle)[-1] | stuck(facts, timeline, cycle))[: facts.columns]
-    return bool((low | ignored).all() and low.any())
+    return bool((low | ignored).all() and (low & ~ignored).any())
 
 
 def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
