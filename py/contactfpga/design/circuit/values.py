@@ -92,8 +92,8 @@ class Falling:
     """Level that an edge of a motor's drive adds to all columns. An assumption."""
     edge_us: float = field(default=0.2, metadata={"limits": (0.0, 1000.0, "us")})
     """Time for which it does."""
-    edge_hz: float = field(default=40_000.0, metadata={"limits": (0.0, 1e6, "Hz")})
-    """Edges per second: those of 20 kHz."""
+    edge_hz: float = field(default=39_900.0, metadata={"limits": (0.0, 1e6, "Hz")})
+    """Edges per second: two of each period of some 20 kHz."""
 
     def __post_init__(self) -> None:
         _check_limits("circuit.falling", self)

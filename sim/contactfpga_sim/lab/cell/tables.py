@@ -22,7 +22,7 @@ FILE = examples() / "cells.toml"
 LEAKS_UA = (10.0, 1.0, 0.1)
 WITHIN = 0.3
 """Octaves of resistance that a level may be off."""
-FRAMES = 400
+FRAMES = 1_000
 SCENES = ("fingertip", "palm", "nothing")
 DISTURBED = {"noise": ("noise_mv",), "a motor's edges": ("edge_mv",), "both": ("noise_mv", "edge_mv")}
 
