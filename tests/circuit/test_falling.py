@@ -7,10 +7,11 @@ that does not track, and a level that a pull or hot diodes hold up.
 import numpy as np
 import pytest
 
-from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, CircuitError, Falling, falling, load_checked, phases
+from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, CircuitError, falling, load_checked, phases
 from contactfpga.design.circuit.falling import Corner
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
+from contactfpga.design.circuit.values import Falling
 from contactfpga.design.sheet import extract
 from contactfpga.design.sheet.layout import lay_out
 from contactfpga.skin import Skin
@@ -25,19 +26,11 @@ def extracted() -> Circuit:
     return extract.extracted(lay_out(Skin(rows=SIZE, columns=SIZE), STATED)).circuit
 
 
-def spice_s(circuit: Circuit, ohm: np.ndarray, column: int, corner: Corner, most_s: float) -> float:
-    """Time of ngspice from selecting the middle row until the column is at the pin's threshold."""
-    network = Network(circuit, np.isfinite(ohm), ohm=ohm)
-    phase = phases.settle(network, Levels.of(circuit))
-    seconds, volts = agreement.run(phase, most_s, 4000, corner.celsius, corner.leak_a)
-    return float(np.interp(-circuit.falling.threshold_v, -volts[:, column], seconds))
-
-
 PATTERNS = {
-    "one cell": {},
-    "a row": {"together": SIZE},
-    "a sheet": {"together": SIZE, "others": SIZE - 1},
-    "neighbors": {"beside": 2},
+    "one cell": ({}, 0.005),
+    "a row": ({"together": SIZE}, 0.005),
+    "a sheet": ({"together": SIZE, "others": SIZE - 1}, 0.005),
+    "neighbors": ({"beside": 2}, 0.035),  # which are still falling
 }
 
 
@@ -46,19 +39,15 @@ PATTERNS = {
 @pytest.mark.parametrize("name", PATTERNS)
 @pytest.mark.parametrize(("celsius", "leak_a"), [(27.0, 0.0), (-20.0, 1e-6), (70.0, -1e-6), (70.0, 1e-6)])
 def test_a_column_falls_as_in_ngspice(name, ohm, celsius, leak_a):
-    circuit = extracted()
-    cells = np.full((SIZE, SIZE), np.inf)
-    if "others" in PATTERNS[name]:
-        cells[:] = ohm
-    elif name != "one cell":
-        cells[ROW, :] = ohm if name == "a row" else np.inf
-    if name == "neighbors":
-        cells[ROW, [2, 4]] = ohm / 50
+    """From selecting the middle row until the column is at the pin's threshold."""
+    (pattern, within), circuit, cells = PATTERNS[name], extracted(), np.full((SIZE, SIZE), np.inf)
+    cells[ROW, [2, 4]] = ohm / 50 if name == "neighbors" else np.inf
     cells[ROW, 3] = ohm
-    corner = Corner(celsius=celsius, leak_a=leak_a, **PATTERNS[name])
-    ours = float(falling.fall_s(circuit, ohm, SIZE, corner)[0])
-    within = 0.035 if "beside" in PATTERNS[name] and ohm < 10_000 else 0.005  # neighbors that are still falling
-    assert spice_s(circuit, cells, 3, corner, 1.3 * ours) == pytest.approx(ours, rel=within)
+    cells[ROW if name == "a row" else slice(0, SIZE if name == "a sheet" else 0)] = ohm
+    ours = float(falling.fall_s(circuit, ohm, SIZE, Corner(celsius=celsius, leak_a=leak_a, **pattern))[0])
+    phase = phases.settle(Network(circuit, np.isfinite(cells), ohm=cells), Levels.of(circuit))
+    seconds, volts = agreement.run(phase, 1.3 * ours, 4000, celsius, leak_a)
+    assert np.interp(-circuit.falling.threshold_v, -volts[:, 3], seconds) == pytest.approx(ours, rel=within)
 
 
 def test_a_light_level_holds_by_the_ruler_alone_and_with_silicon_diodes_alone():
@@ -71,30 +60,33 @@ def test_a_light_level_holds_by_the_ruler_alone_and_with_silicon_diodes_alone():
     assert falling.read_ohm(circuit, 17, float(falling.fall_s(circuit, 9e4, 17)[0])) == pytest.approx(9e4, rel=0.01)
 
 
+FILE = """guard = true
+precharge_us = 0.5
+ruler = 28
+settle_us = 40
+[circuit]
+diode = "silicon"
+column_pull_ohm = 1e8
+falling.column_pf = 220
+"""
+
+
 @pytest.mark.parametrize(
-    ("changes", "skin", "message"),
+    ("old", "new", "message"),
     [
-        ("column_pull_ohm = 47_000", "", "columns do not fall through ruler_ohm = 25000: column_pull_ohm = 47000"),
-        ("column_pull_ohm = 1e8\ndiode = 'schottky'", "settle_us = 40", ""),
-        ("column_pull_ohm = 1e8", "settle_us = 10", "settle_us is 10; with ruler = 28 the latest sample comes after"),
-        ("column_pull_ohm = 1e8", "ruler = 0", "ruler is 0; [circuit.falling] needs a Skin with a ruler"),
-        ("column_pull_ohm = 1e8\nfalling.leak_ua = -1", "", "leak_ua in [circuit.falling] is -1; it must lie between"),
-        ("column_pull_ohm = 1e8\nfalling.ohm = 1", "", "unknown key 'ohm' in [circuit.falling]"),
+        ("1e8", "47_000", "columns do not fall through the ruler: column_pull_ohm = 47000, or hot diodes"),
+        ("us = 40", "us = 10", "settle_us is 10; with ruler = 28 the latest sample comes after"),
+        ("28", "0", "ruler is 0; [circuit.falling] needs a Skin with a ruler"),
+        ("falling.column_pf", "line_pf", "there is no [circuit.falling]"),
+        ("column_pf = 220", "leak_ua = -1", "leak_ua in [circuit.falling] is -1; it must lie between"),
+        ("column_pf", "pf", "unknown key 'pf' in [circuit.falling]"),
     ],
 )
-def test_a_file_whose_columns_cannot_fall_is_refused(tmp_path, changes, skin, message):
-    stated = {"guard": "true", "precharge_us": "0.5", "ruler": "28", "settle_us": "40"}
-    stated |= dict([skin.split(" = ")] if skin else [])
-    text = "".join(f"{name} = {value}\n" for name, value in stated.items())
+def test_a_file_whose_columns_cannot_fall_is_refused(tmp_path, old, new, message):
     path = tmp_path / "skin.toml"
-    path.write_text(
-        f"{text}[circuit]\ndiode = 'silicon'\n{changes}\nfalling.column_pf = 220\n".replace(
-            "diode = 'silicon'\n", "" if "diode" in changes else "diode = 'silicon'\n"
-        )
-    )
-    if not message:
-        assert load_checked(path, Skin.load(path)).falling == Falling()
-        return
+    path.write_text(FILE)
+    assert load_checked(path, Skin.load(path)).falling == Falling()
+    path.write_text(FILE.replace(old, new))
     with pytest.raises(CircuitError) as caught:
         load_checked(path, Skin.load(path))
     assert message in str(caught.value)

@@ -21,40 +21,28 @@ from contactfpga_sim.model.scenes.scene import palm
 
 SKIN = Skin(rows=3, columns=4, ruler=24, report="cells", guard=True, precharge_us=1, release_us=2, settle_us=30,
             row_order=(2, 0, 1), column_order=(1, 3, 0, 2))  # fmt: skip
-CLOCK_S = 1 / SKIN.clock_hz
 END, THRESHOLD = 0.9, 0.6
 
 
-def read(seconds, frames, noise=(0.0, 0.0, 0.0, 0.0)):
-    """(frames, rows, columns) cells of a board whose columns fall in these (row lines, column lines) seconds."""
+def read(clocks, frames, noise=(0.0, 0.0, 0.0, 0.0)):
+    """(frames, rows, columns) cells of a board whose columns fall in these (row lines, column lines) clocks."""
     with CompiledBoard(SKIN) as board:
-        board.fall(seconds, END, THRESHOLD)
+        board.fall(clocks / SKIN.clock_hz, END, THRESHOLD)
         board.disturb(*noise)
         board.hold(np.ones((1, SKIN.rows, SKIN.columns), bool), (frames + 2) * SKIN.derived.frame_clocks)
         received = board.take("received")
     stream = zip(received["cycle"].tolist(), received["data"].tolist())
-    found = [one.frame.bitmap for one in Receiver(SKIN).take(stream)]
-    return np.array(found[1 : frames + 1])
-
-
-def times(rng, ruler):
-    """Clocks of the sheet's crossings; the slowest of the ruler's columns has ``ruler``."""
-    clocks = rng.uniform(2.0, 300.0, (SKIN.row_lines, SKIN.column_lines))
-    clocks[-1] = rng.uniform(0.8 * ruler, ruler, SKIN.column_lines)
-    clocks[-1, 1], clocks[-1, -1] = ruler, np.inf
-    clocks[:-1, -1] = ruler
-    return clocks
+    return np.array([one.frame.bitmap for one in Receiver(SKIN).take(stream)][1 : frames + 1])
 
 
 @pytest.mark.parametrize("ruler", [37.0, 101.0])
 def test_a_cell_reads_pressed_if_it_falls_within_the_multiple_of_the_rulers_time(ruler):
-    clocks = times(np.random.default_rng(int(ruler)), ruler)
-    cells = clocks[:-1, :-1]
-    expected = cells < 24 / 16 * ruler
-    sure = np.abs(cells - 24 / 16 * ruler) > 3
-    assert 0.2 < expected.mean() < 0.9
-    found = read(clocks * CLOCK_S, 5)
-    assert (found[:, sure] == expected[sure]).all()
+    clocks = np.random.default_rng(int(ruler)).uniform(2.0, 300.0, (SKIN.row_lines, SKIN.column_lines))
+    clocks[-1], clocks[:-1, -1] = [0.9 * ruler, ruler, 0.8 * ruler, 0.9 * ruler, np.inf], ruler
+    cells, sample = clocks[:-1, :-1], 24 / 16 * ruler
+    assert 0.2 < (cells < sample).mean() < 0.9
+    sure = np.abs(cells - sample) > 3
+    assert (read(clocks, 5)[:, sure] == (cells < sample)[sure]).all()
 
 
 def test_noise_and_edges_turn_as_many_readings_as_they_should():
@@ -66,13 +54,13 @@ def test_noise_and_edges_turn_as_many_readings_as_they_should():
     for column, away in enumerate((-2.0, -1.0, 0.0, 1.0)):
         share = THRESHOLD - away * sigma  # of the way, at the sample
         clocks[:-1, column] = sampled * math.log1p(-THRESHOLD / END) / math.log1p(-share / END)
-    pressed = read(clocks * CLOCK_S, frames, (sigma, 0.0, 0.0, 0.0)).mean(axis=(0, 1))
+    pressed = read(clocks, frames, (sigma, 0.0, 0.0, 0.0)).mean(axis=(0, 1))
     usual = [(1 + math.erf(-away / 2)) / 2 for away in (-2.0, -1.0, 0.0, 1.0)]
     assert pressed == pytest.approx(usual, abs=0.06)  # a clock is 0.4 of the noise's deviation
     assert (np.diff(pressed) < -0.02).all()
     clocks[:-1, :-1] = 87.0
     for lasts_s, period_s in ((20e-6, 73e-6), (5e-6, 73e-6)):
-        missed = 1 - read(clocks * CLOCK_S, 1_500, (0.0, -0.06, lasts_s, 1 / period_s)).mean()
+        missed = 1 - read(clocks, 1_500, (0.0, -0.06, lasts_s, 1 / period_s)).mean()
         hit = lasts_s / period_s
         assert hit * (1 - hit) - 0.05 < missed < hit + 0.02  # an edge at the ruler moves the sample beyond the next one
 

@@ -33,11 +33,7 @@ _ALL = (
         title="Resistive cells read by the time in which a column falls",
         page="cell.md",
         minutes=1,
-        sections=tables(
-            materials=Section("tables:materials_table", sample="tables:materials_table"),
-            levels=Section("tables:levels_table", sample="tables:levels_table"),
-            wrong=Section("tables:wrong_table"),
-        ),
+        sections=tables("levels wrong", materials=Section("tables:materials_table", sample="tables:materials_table")),
     ),
     Study(
         "chart",

@@ -5,16 +5,7 @@ Units are SI; capacitances are in pF and times in us where a name says so.
 
 from contactfpga.design.circuit.static import Problem, check, load_checked, problems
 from contactfpga.design.circuit.times import Needs, check_times, needed, needed_by, recommended_us
-from contactfpga.design.circuit.values import (
-    DIODES,
-    SCHOTTKY,
-    SILICON,
-    Circuit,
-    CircuitError,
-    Diode,
-    Falling,
-    load_circuit,
-)
+from contactfpga.design.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode, load_circuit
 
 __all__ = [
     "DIODES",
@@ -23,7 +14,6 @@ __all__ = [
     "Circuit",
     "CircuitError",
     "Diode",
-    "Falling",
     "Needs",
     "Problem",
     "check",

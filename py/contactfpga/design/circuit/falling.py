@@ -57,14 +57,13 @@ def fall_s(circuit: Circuit, ohm: np.ndarray | float, rows: int, corner: Corner 
     diode, resistance = circuit.diode.at(corner.celsius), np.atleast_1d(np.asarray(ohm, float))
     step, saturation = diode.emission * THERMAL_V, diode.saturation_a
     end_v = falling.threshold_v + corner.threshold_v
-    beside_pf = 2 * circuit.neighbor_pf
-    column_pf = falling.column_pf * (1 + corner.tolerance) + circuit.line_pf + rows * circuit.crossing_pf
-    farads = PF * (column_pf + beside_pf * (corner.together == 1))
-    reverse = np.array([0.0, end_v - circuit.supply_v])
-    farads += corner.others * np.diff(charge(diode, reverse)[0])[0] / (end_v - circuit.supply_v)
-    rest_v = step * math.log1p(1e-6 / saturation)  # of neighbors that have fallen, about
-    pulled_v = PF * circuit.neighbor_pf * corner.beside * (circuit.supply_v - rest_v) / farads
-    start_v = circuit.supply_v - pulled_v - PF * circuit.crossing_pf * circuit.supply_v / farads
+    line_pf = circuit.line_pf + rows * circuit.crossing_pf + 2 * circuit.neighbor_pf * (corner.together == 1)
+    farads = PF * (falling.column_pf * (1 + corner.tolerance) + line_pf)
+    reverse_v = end_v - circuit.supply_v
+    farads += corner.others * np.diff(charge(diode, np.array([0.0, reverse_v]))[0])[0] / reverse_v
+    fallen_v = circuit.supply_v - step * math.log1p(1e-6 / saturation)  # by neighbors, about
+    pulled_pf_v = circuit.neighbor_pf * corner.beside * fallen_v + circuit.crossing_pf * circuit.supply_v
+    start_v = circuit.supply_v - PF * pulled_pf_v / farads
     whole = resistance + diode.series_ohm + corner.together * circuit.drive_ohm
     first, last = (_amperes(volts, whole, step, saturation) for volts in (end_v, start_v))
     amperes = np.geomspace(first, last, STEPS)
@@ -100,16 +99,13 @@ def read_ohm(circuit: Circuit, rows: int, seconds: np.ndarray | float, corner: C
 def corners(circuit: Circuit, rows: int, columns: int, leak_ua: float) -> Iterator[tuple[Corner, Corner]]:
     """The ruler's slowest column and a cell's, at all corners of temperature, threshold, leakage, capacitor and pressed
     neighbors. Temperature and threshold are those of both; leakage and capacitor are each column's own."""
-    falling = parts(circuit)
-    worst = leak_ua * 1e-6
-    spread = falling.threshold_spread_v
+    spread, tolerance, worst = parts(circuit).threshold_spread_v, parts(circuit).tolerance, leak_ua * 1e-6
     patterns = ({}, {"together": columns}, {"together": columns, "others": rows - 1}, {"beside": 2})
     for celsius, threshold, leak, other, end, pattern in itertools.product(
         (COLD_C, USUAL_C, HOT_C), (-spread, 0.0, spread), (-worst, worst), (-worst, worst), (-1, 1), patterns
     ):
-        shared = {"celsius": celsius, "threshold_v": threshold}
-        ruler = Corner(**shared, leak_a=other, tolerance=falling.tolerance)
-        yield ruler, Corner(**shared, leak_a=leak, tolerance=end * falling.tolerance, **pattern)  # type: ignore[arg-type]
+        ruler = Corner(celsius=celsius, threshold_v=threshold, leak_a=other, tolerance=tolerance)
+        yield ruler, dataclasses.replace(ruler, leak_a=leak, tolerance=end * tolerance, **pattern)
 
 
 def error_octaves(
@@ -140,10 +136,8 @@ def check(circuit: Circuit, skin: Skin) -> None:
     lines = skin.row_lines, skin.columns
     most_us = max(1e6 * ruler_s(circuit, *lines, ruler) for ruler, _ in corners(circuit, *lines, 0.0))
     if math.isinf(most_us):
-        raise CircuitError(
-            f"columns do not fall through ruler_ohm = {parts(circuit).ruler_ohm:g}: column_pull_ohm = "
-            f"{circuit.column_pull_ohm:g} or hot diodes feed them; leave that resistor out (1e8), with silicon diodes"
-        )
+        what = f"columns do not fall through the ruler: column_pull_ohm = {circuit.column_pull_ohm:g}, or hot diodes"
+        raise CircuitError(f"{what}, feed them; leave that resistor out (1e8), and take silicon diodes")
     if (needed_us := most_us * max(skin.ruler, SIXTEENTHS) / SIXTEENTHS) > skin.settle_us:
         late = f"with ruler = {skin.ruler} the latest sample comes after {needed_us:.1f} us"
         raise CircuitError(f"settle_us is {skin.settle_us:g}; {late}")

@@ -65,9 +65,7 @@ class Needs:
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
     """Times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
     if circuit.falling:
-        raise CircuitError(
-            "columns fall through resistive cells, as [circuit.falling] says; these are times of switches"
-        )
+        raise CircuitError("there is [circuit.falling], whose columns fall through cells; these are times of switches")
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))

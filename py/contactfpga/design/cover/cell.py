@@ -6,22 +6,27 @@ A power law from a least force on, R = R1 (F / 1 N)^-k, with shares as data shee
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
 
-from contactfpga.design.cover.answer import CoverError, finite, not_negative, positive
+from contactfpga.design.cover.answer import CoverError
 from contactfpga.design.cover.numerics import Floats
 from contactfpga.design.cover.point import Switch
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import is_finite, shown
+
+_LIMITS = {"level_n": (1e-3, 1e3), "ohm_at_1n": (1.0, 1e9), "exponent": (0.1, 5.0), "least_ohm": (0.1, 1e6)}
+_LIMITS |= {"spread": (0.0, 1.0), "hysteresis": (0.0, 0.9), "creep": (0.0, 0.2), "preload_n": (0.0, 10.0)}
+_LIMITS |= {"per_celsius": (-0.01, 0.01)}
 
 
 @dataclasses.dataclass(frozen=True)
 class ResistiveCell:
-    """The table ``[cover.cell]``; a file may start from one of :data:`MATERIALS`, ``material = "fsr402"``."""
+    """The table ``[cover.cell]``, whose ``material`` is one of :data:`MATERIALS`; other keys replace its values."""
 
+    material: str
+    """Name of the material that gives the values that are not stated."""
     level_n: float
     """Force at which a usual cell shall read pressed."""
     ohm_at_1n: float
@@ -44,19 +49,16 @@ class ResistiveCell:
     """Mean square root of the forces on cells under a glued cover, without a touch."""
 
     def __post_init__(self) -> None:
-        for name in ("level_n", "ohm_at_1n", "exponent", "least_ohm"):
-            positive(name, getattr(self, name), "")
-        for name, most in (("break_n", self.level_n), ("spread", 1.0), ("hysteresis", 0.9), ("creep", 0.2)):
-            if not_negative(name, getattr(self, name), "") > most:
-                raise CoverError(f"{name} is {getattr(self, name):g}; it must lie between 0 and {most:g}")
-        not_negative("preload_n", self.preload_n, "N")
-        if abs(finite("per_celsius", self.per_celsius)) > 0.01:
-            raise CoverError(f"per_celsius is {self.per_celsius:g}; it must lie between -0.01 and 0.01")
+        for name, (low, high) in (_LIMITS | {"break_n": (0.0, self.level_n)}).items():
+            value = getattr(self, name)
+            if not is_finite(value) or not low <= value <= high:
+                raise CoverError(f"{name} in [cover.cell] is {shown(value)}; it must lie between {low:g} and {high:g}")
 
-    def ohm(self, force_n: Floats, celsius: float = 25.0, seconds: float = 1.0, falling: bool = False) -> Floats:
-        """Resistance of usual cells after ``seconds`` under these forces; infinite for an open cell."""
-        share = 1 + self.per_celsius * (celsius - 25.0) - self.creep * max(0.0, math.log10(seconds))
-        share *= 1 - self.hysteresis * falling
+    def ohm(self, force_n: Floats, celsius: float = 25.0, seconds: Any = 1.0, falling: Any = False) -> Floats:
+        """Resistance of usual cells after ``seconds`` under these forces; infinite for an open cell. ``seconds`` and
+        ``falling`` may be arrays of the same shape."""
+        share = 1 + self.per_celsius * (celsius - 25.0) - self.creep * np.log10(np.maximum(1.0, seconds))
+        share = share * (1 - self.hysteresis * np.asarray(falling))
         force = np.asarray(force_n, float)
         closed = force >= self.break_n
         found = np.maximum(share * self.ohm_at_1n * np.where(closed, force, 1.0) ** -self.exponent, self.least_ohm)
@@ -79,7 +81,7 @@ class ResistiveCell:
         return np.exp(self.spread * rng.standard_normal(shape)), np.abs(self.preload_n * rng.standard_normal(shape))
 
 
-MATERIALS: dict[str, dict[str, float]] = {
+MATERIALS: dict[str, dict[str, Any]] = {
     "fsr402": {"level_n": 0.2, "ohm_at_1n": 6_200.0, "exponent": 0.7, "break_n": 0.1},
     "velostat": {"level_n": 0.2, "ohm_at_1n": 10_000.0, "exponent": 1.0, "break_n": 0.02, "spread": 0.3,
                  "hysteresis": 0.2, "creep": 0.1},
@@ -95,17 +97,8 @@ Celsius; 6.2 kilohms under 1 N and 0.25 under 100 N are read off its curve. ``ve
 
 def read_cell(values: Any) -> ResistiveCell:
     """The cell of a TOML table. Raises CoverError."""
-    given = dict(tomlfile.fields_of(ResistiveCell, "cover.cell", _of_material(values), CoverError))
-    if missing := [name for name in MATERIALS["fsr402"] if name not in given]:
-        materials = ", ".join(MATERIALS)
-        raise CoverError(f"{missing[0]} is missing in [cover.cell]; give it, or material, one of {materials}")
-    return ResistiveCell(**given)
-
-
-def _of_material(values: Any) -> Any:
-    if not isinstance(values, dict) or "material" not in values:
-        return values
-    name = values["material"]
+    given = tomlfile.fields_of(ResistiveCell, "cover.cell", values, CoverError)
+    name = given.get("material")
     if not isinstance(name, str) or name not in MATERIALS:
-        raise CoverError(f"material is {shown(name)}; it must be one of {', '.join(MATERIALS)}")
-    return MATERIALS[name] | {key: value for key, value in values.items() if key != "material"}
+        raise CoverError(f"material in [cover.cell] is {shown(name)}; it must be one of {', '.join(MATERIALS)}")
+    return ResistiveCell(**MATERIALS[name] | given)

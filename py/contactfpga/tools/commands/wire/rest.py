@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.instruments.rest import NEVER, Rest
-from contactfpga.skin import Skin
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
 from contactfpga.tools.commands.wire.settle import restored
 from contactfpga.tools.console import interrupt, results
@@ -27,38 +25,35 @@ def measure(board: Board, args: argparse.Namespace) -> int:
         try:
             while (level := rest.next_level()) is not None:
                 rest.take(level, board.sample_at(level, args.timeout).cells)
-            _follow(board, rest, args)
+            if args.seconds is not None:
+                _follow(board, rest, args.seconds, args.timeout)
         finally:
             end = restored(board, args.timeout)
-    high = rest.high(skin.ruler)
-    results.show(args, _answer(rest, skin, high) | {"findings": end}, lambda: _show(rest, skin, high))
-    return 1 if rest.lightest is not None and rest.lightest < skin.ruler else 0
+    if rest.next_level() is not None:
+        raise ContactFPGAError(f"{board.port}: stopped before all rest levels were known; leave it running for longer")
+    high, lightest = rest.high(skin.ruler), rest.lightest
+    levels = [[None if level >= NEVER else round(level, 2) for level in row] for row in rest.levels.tolist()]
+    answer = {"ruler": skin.ruler, "lightest": lightest, "levels": levels, "high": high, "findings": end}
+    results.show(args, answer, lambda: _show(rest, skin.ruler, high))
+    return 1 if lightest is not None and lightest < skin.ruler else 0
 
 
-def _follow(board: Board, rest: Rest, args: argparse.Namespace) -> None:
-    begun_us: int | None = None
-    while args.seconds is not None:
-        zones = board.sample_at(0, args.timeout)
-        begun_us = zones.time_us if begun_us is None else begun_us
-        if zones.time_us - begun_us >= args.seconds * 1e6:
-            return
+def _follow(board: Board, rest: Rest, seconds: float, timeout: float) -> None:
+    zones = board.sample_at(0, timeout)
+    end_us = zones.time_us + seconds * 1e6
+    while zones.time_us < end_us:
         if rest.quiet(bool(zones.cells.any()), zones.time_us):
             level = rest.probe()
-            rest.renew(level, board.sample_at(level, args.timeout).cells)
+            rest.renew(level, board.sample_at(level, timeout).cells)
+        zones = board.sample_at(0, timeout)
 
 
-def _answer(rest: Rest, skin: Skin, high: list[tuple[int, int]]) -> dict[str, Any]:
-    levels = [[None if level >= NEVER else round(level, 2) for level in row] for row in rest.levels.tolist()]
-    return {"ruler": skin.ruler, "lightest": rest.lightest, "levels": levels, "high": high}
-
-
-def _show(rest: Rest, skin: Skin, high: list[tuple[int, int]]) -> None:
+def _show(rest: Rest, ruler: int, high: list[tuple[int, int]]) -> None:
     if rest.lightest is None:
         terminal.say("No cell reads pressed without a touch at any level: the end of settle_us is the lightest.")
-    elif rest.lightest < skin.ruler:
-        terminal.say(f"ruler = {skin.ruler} is too light for this sheet at rest; ruler = {rest.lightest} would hold.")
     else:
-        terminal.say(f"ruler = {skin.ruler} holds; the lightest level that does is ruler = {rest.lightest}.")
+        holds = "holds" if rest.lightest >= ruler else "is too light for this sheet at rest"
+        terminal.say(f"ruler = {ruler} {holds}; the lightest level that holds is ruler = {rest.lightest}.")
     if high:
         named = ", ".join(f"{cell} from {rest.levels[cell]:.0f}" for cell in high[:NAMED])
         terminal.say(f"high at rest: {named}{', ...' if len(high) > NAMED else ''}; a preload, or a leak", hang=2)
