@@ -28,31 +28,27 @@ SKINS = {
 def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
     """In each slot columns read pressed from a random clock on: columns cut from the guard row, and cells, until then.
     Sometimes a column never does, for several frames; levels are commanded at any time."""
-    known = facts(skin)
-    cuts, pieces = {0: Cuts()}, {}
-    broken = np.zeros(skin.columns, bool)
+    known, cuts, pieces, received, broken = facts(skin), {}, {}, [], np.zeros(skin.columns, bool)
     for frame in range(frames):
         start = known.row_shift + frame * known.scan_clocks
         if rng.random() < 0.15:
             broken = rng.random(skin.columns) < rng.choice([0, 0.4, 1])
         last = known.settle + 2 if rng.random() < 0.1 else 1 + known.settle // 2
         fall = np.where(broken, known.row_clocks, rng.integers(0, last, skin.columns))
-        for clock in (-1, *sorted({*fall.tolist()})):
-            gone = dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows)
-            cuts[max(1, start + clock)] = Cuts({}, gone)
-        for slot in range(1, known.row_lines):
-            at = start + slot * known.row_clocks
+        for clock in (-1, *{*fall.tolist()}):
+            cuts[max(0, start + clock)] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows))
+        for at in range(start + known.row_clocks, start + known.scan_clocks, known.row_clocks):
             cuts[at - 1] = Cuts({0: skin.columns} if rng.random() < 0.05 else {})
             close = rng.integers(0, known.settle + 3, skin.columns)
-            for clock in (-1, *sorted({*close.tolist()})):
-                pieces[at + clock] = (np.tile(close <= clock, (skin.rows, 1)), None)
-    received, at = [], 0
+            pieces |= {at + clock: np.tile(close <= clock, (skin.rows, 1)) for clock in (-1, *close.tolist())}
+    at = 0
     for number in range(129 * 128 + 1, 129 * 128 + 8):
-        at += int(rng.integers(10, frames // 8 * known.scan_clocks))
         value = int(rng.choice([0, 1, 12, 23, 24, 64, 255, 256, 5 << 14]))
         received.append((at, command(number, 2, value, False, known.bit_clocks)))
-        at += len(received[-1][1]) * 10 * known.bit_clocks
-    return Timeline([(at, *pieces[at]) for at in sorted(pieces)], received, [(at, cuts[at]) for at in sorted(cuts)])
+        at += 140 * known.bit_clocks + int(rng.integers(10, frames // 8 * known.scan_clocks))
+    return Timeline(
+        [(at, pieces[at], None) for at in sorted(pieces)], received, [(at, cuts[at]) for at in sorted(cuts)]
+    )
 
 
 @pytest.mark.parametrize("name", sample(SKINS, quick=["zones", "cells, masked"], slow=["shift registers"]))

@@ -16,7 +16,6 @@ REFUSED = [
         "diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'",
     ),
     ({"ruler": 16}, "ruler is 16; columns that fall need guard = true, precharge_us and scan = 'raster'"),
-    ({"ruler": 16, "guard": True}, "ruler is 16; columns that fall need guard = true, precharge_us"),
     ({"ruler": 256}, "ruler is 256; it must lie between 0 and 255"),
     ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
     ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
