@@ -271,7 +271,9 @@ def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
     if table == "cover":  # a foam is a name for a modulus
         name = tomllib.loads(f"x = {defaults.pop('foam').strip('`')}")["x"]
         defaults["modulus_pa"] = str(foams.find(name).layer_pa)
-    fields = {field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap", "cell")}
+    fields = {
+        field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap", "cell")
+    }
     assert defaults.keys() == fields.keys()
     for name, default in fields.items():
         if default is None:
