@@ -19,7 +19,7 @@ from contactfpga_sim.verify.cosim.compare import compare
 TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True, "precharge_us": 2, "release_us": 4}
 SKINS = {
     "zones": Skin(rows=3, columns=4, ruler=32, settle_us=24, **TINY),
-    "cells, masked": Skin(rows=2, columns=3, ruler=40, report="cells", mask=((0, 1), (1, 1)), settle_us=20, **TINY),
+    "cells, masked": Skin(rows=2, columns=3, ruler=20, report="cells", mask=((0, 1), (1, 1)), settle_us=20, **TINY),
     "one row, mirrored": Skin(rows=1, columns=2, ruler=8, diodes="row2col", fail_safe=True, settle_us=30, **TINY),
     "shift registers": Skin(rows=4, columns=2, ruler=20, row_drive="74hc595", alive=True, settle_us=30, **TINY),
 }
@@ -41,7 +41,7 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
             cuts[at - 1] = Cuts({0: skin.columns} if rng.random() < 0.05 else {})
             close = rng.integers(0, known.settle + 3, skin.columns)
             pieces |= {at + clock: np.tile(close <= clock, (skin.rows, 1)) for clock in (-1, *close.tolist())}
-    at = 0
+    at = 10 * known.scan_clocks
     for number in range(129 * 128 + 1, 129 * 128 + 8):
         value = int(rng.choice([0, 1, 12, 23, 24, 64, 255, 256, 5 << 14]))
         received.append((at, command(number, 2, value, False, known.bit_clocks)))
