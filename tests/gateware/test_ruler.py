@@ -32,7 +32,8 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
     for frame in range(frames):
         start = known.row_shift + frame * known.scan_clocks
         if rng.random() < 0.15:
-            broken = rng.random(skin.columns) < rng.choice([0, 0.4, 1])
+            late = frame > 2 * frames // 3  # what is reported open stays so for longer than this test
+            broken = rng.random(skin.columns) < rng.choice([0, 0.4, 1]) * (late | (np.arange(skin.columns) == 0))
         last = known.settle + 2 if rng.random() < 0.1 else 1 + known.settle // 2
         fall = np.where(broken, known.row_clocks, rng.integers(0, last, skin.columns))
         for clock in (-1, *{*fall.tolist()}):
