@@ -85,7 +85,7 @@ class Falling:
     threshold_spread_v: float = field(default=0.3, metadata={"limits": (0.0, 2.0, "V")})
     """Largest difference of an FPGA's threshold from that; its pins are alike."""
     leak_ua: float = field(default=10.0, metadata={"limits": (0.0, 1000.0, "uA")})
-    """Largest leakage of a pin, in or out: 10 in the data sheets of iCE40 and ECP5."""
+    """Largest leakage of a pin, in or out. An assumption: take the limit of your FPGA's data sheet."""
     noise_mv: float = field(default=5.0, metadata={"limits": (0.0, 1000.0, "mV")})
     """Standard deviation of a column's level at its threshold, from sample to sample. An assumption."""
     edge_mv: float = field(default=100.0, metadata={"limits": (-3000.0, 3000.0, "mV")})
