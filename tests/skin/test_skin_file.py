@@ -117,6 +117,8 @@ def test_every_field_is_in_the_fingerprint():
         reversal.replace(precharge_us=0.5),
         reversal.replace(self_test=True),
     ]
+    falls = Skin(guard=True, precharge_us=1.0)
+    others += [falls, falls.replace(ruler=16)]
     measured = Skin(units=2)
     of_units = {"converter": "toy_converter:MINE", "converter_v": 5.0, "unit_sums": ((1, 1),)}
     others += [measured, *(measured.replace(**{name: value}) for name, value in of_units.items())]
@@ -130,6 +132,7 @@ def test_every_field_is_in_the_fingerprint():
         "project_us",
         "barycenter_bits",
         "self_test",
+        "ruler",
     }
     assert {*OTHER, *elsewhere, *only_there, *of_units} == {field.name for field in dataclasses.fields(Skin)}
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
@@ -271,7 +274,9 @@ def test_the_page_lists_each_key_of_the_cover_with_its_default(table, kind):
         name = tomllib.loads(f"x = {defaults.pop('foam').strip('`')}")["x"]
         defaults["modulus_pa"] = str(foams.find(name).layer_pa)
     fields = {
-        field.name: field.default for field in dataclasses.fields(kind) if field.name not in ("switch", "cap", "bed")
+        field.name: field.default
+        for field in dataclasses.fields(kind)
+        if field.name not in ("switch", "cap", "cell", "bed")
     }
     assert defaults.keys() == fields.keys()
     for name, default in fields.items():

@@ -15,6 +15,8 @@ REFUSED = [
         {"guard": True, "diodes": "none", "connectivity": 4},
         "diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'",
     ),
+    ({"ruler": 16}, "ruler is 16; columns that fall need guard = true, precharge_us and scan = 'raster'"),
+    ({"ruler": 256}, "ruler is 256; it must lie between 0 and 255"),
     ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
     ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
     ({"rows": 2, "row_order": [0, 0]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 2 times"),

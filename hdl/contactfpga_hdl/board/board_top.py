@@ -126,7 +126,7 @@ class BoardTop(Elaboratable):
 
     def _pulls(self, name: str) -> Mapping[str, object]:
         up = self.skin.selects_low == (name == "columns")
-        needs = name == "columns" or f"{name}_read" in self._sheet
+        needs = (name == "columns" and not self.skin.ruler) or f"{name}_read" in self._sheet
         return self.board.pulls["col2row" if up else "row2col"] if needs else {}
 
     def _resources(self) -> list[Resource]:

@@ -126,6 +126,11 @@ class Scanner(wiring.Component):
         if not skin.dual:
             found = upset(m, "row", slots.following, driver.drive)
             m.d.comb += self.upset.eq(driver.upset | found | clock.upset)
+        if skin.ruler:
+            live = ~reader.levels if skin.selects_low else reader.levels
+            begun, clock_of = slots.following[0] & (slots.clock == 0), slots.clock
+            under_way = sample.is_guard & (clock_of >= 2) & (clock_of <= self.derived.settle_clocks + 1)
+            self._ruler.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
         # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),
@@ -180,9 +185,14 @@ class Scanner(wiring.Component):
     def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
-        from contactfpga_hdl.scan.sample_at import SampleAt
+        if self.skin.ruler:
+            from contactfpga_hdl.scan.ruler import Ruler
 
-        chosen = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
+            self._ruler = chosen = Ruler(m, self.derived, self.moves, self.clocks, slots.begins_rows)
+        else:
+            from contactfpga_hdl.scan.sample_at import SampleAt
+
+            chosen = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
         sample.early = chosen.early
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 

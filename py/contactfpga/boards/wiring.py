@@ -120,6 +120,8 @@ def parts(skin: Skin) -> dict[str, int]:
         "diodes": 0 if skin.diodes == "none" else cells + guards,
         "series resistors": len(lines),
         "pull resistors": sum(bool(line.pull) for line in lines),
+        "ruler resistors": skin.ruler and guards,
+        "column capacitors": skin.ruler and skin.column_lines,
         **chips,
         "capacitors of 100 nF": chips.total(),
     }
@@ -134,7 +136,8 @@ def row_lines(skin: Skin) -> list[Connection]:
 
 def column_lines(skin: Skin) -> list[Connection]:
     """Connection of each column's line; the guard column's comes last."""
-    return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
+    pull = "" if skin.ruler else "up" if skin.selects_low else "down"
+    return _sheet_lines("column", skin.line_of_column, skin.columns, pull)
 
 
 def _sheet_lines(kind: str, line_of: Sequence[int], count: int, pull: str) -> list[Connection]:

@@ -68,7 +68,7 @@ def _wirings(skin: Skin) -> Iterator[dict[str, Any]]:
 
 def _times(skin: Skin, changes: dict[str, Any], circuit: Circuit | None, factor: int) -> dict[str, Any]:
     found: dict[str, Any] = {"settle_us": skin.settle_us * factor} if factor > 1 else {}
-    if circuit is not None:
+    if circuit is not None and not circuit.falling:
         slow = skin.replace(**changes, settle_us=_SLOW_US)  # so that no row is too short to ask
         needs = needed_by(skin, circuit)
         for name, us in recommended_us(slow, needs).items():

@@ -118,6 +118,8 @@ class Board(BoardFacts):
         measures the settle time that the sheet needs (``contactfpga wire --settle``). Returns the first frame sampled
         in this way. Until the value is 0 again, or the board restarts, slower cells do not read pressed.
 
+        A board with a ruler takes ``clocks`` as sixteenths of the ruler's time (docs/cell.md).
+
         0, larger values than the settle time, and values too early for the board (less than 2 clocks, or than shift
         registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"``
         take it.

@@ -25,7 +25,7 @@ LINE_CELLS = 3
 """Least cells of a slow line, most of which are slow."""
 
 
-class _Search:
+class Bisection:
     """The least sufficient clocks of each place by bisection; all places see the same frames."""
 
     def __init__(self, shape: tuple[int, ...], first: int, settle: int):
@@ -70,8 +70,8 @@ class Settling:
     def __init__(self, shape: tuple[int, int], first: int, settle: int, *, skips: bool = False, guard: bool = False):
         self.first, self.settle = first, settle
         self._skips, self._guard = skips, guard
-        self._press = _Search(shape, first, settle)
-        self._back = _Search(shape[1:], first, settle)
+        self._press = Bisection(shape, first, settle)
+        self._back = Bisection(shape[1:], first, settle)
         self._steady = np.zeros(shape, int)
         self._full = np.zeros(shape, bool)
 

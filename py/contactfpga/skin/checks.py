@@ -130,6 +130,9 @@ def _check_order(skin: Skin, kind: str) -> tuple[int, ...]:
 def _check_guard(skin: Skin) -> None:
     if skin.guard and skin.ghosts:
         raise SkinError("diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'")
+    _within(skin, "ruler")
+    if skin.ruler and not (skin.guard and skin.precharge_us and skin.scan == "raster"):
+        raise SkinError(f"ruler is {skin.ruler}; columns that fall need guard = true, precharge_us and scan = 'raster'")
     if skin.self_test and not skin.reads_rows:
         raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
 

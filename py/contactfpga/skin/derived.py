@@ -43,7 +43,10 @@ STUCK_MAX = (1 << STUCK_BITS) - 1
 SELF_TEST = 1
 """Number of the command that tests all lines (docs/protocol.md)."""
 SAMPLE_AT = 2
-"""Number of the command that sets the clock of a row at which the columns are sampled."""
+"""Number of the command that sets the clock of a row at which the columns are sampled, or with a ruler the sixteenths
+of its time."""
+MAX_RULER = 255
+"""Latest sample in sixteenths of the ruler's time."""
 
 
 class Widths:
@@ -193,7 +196,8 @@ class Derived(Widths):
     @property
     def commands(self) -> tuple[int, ...]:
         self_test = (SELF_TEST,) if self.skin.self_test else ()
-        return self_test + (() if self.report.zones else (SAMPLE_AT,)) + self.units.commands
+        moves = not self.report.zones or self.skin.ruler
+        return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:

@@ -23,7 +23,7 @@ from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shell_words, shown, suggestion
 from contactfpga.skin import checks
-from contactfpga.skin.derived import Derived
+from contactfpga.skin.derived import MAX_RULER, Derived
 from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
 
 
@@ -62,6 +62,9 @@ class Skin:
     """(row, column) of absent or broken switches, which are never pressed and never stuck."""
     guard: bool = False
     """Whether one more row and column have crossings that are always closed, to name broken lines (docs/faults.md)."""
+    ruler: int = field(default=0, metadata={"limits": (0, MAX_RULER, "")})
+    """Instant at which rows are sampled, in sixteenths of the time in which the columns fall through known resistors at
+    the guard crossings (docs/cell.md); 0: there are switches, and rows are sampled at the end of ``settle_us``."""
     row_order: tuple[int, ...] = ()
     """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()

@@ -28,7 +28,7 @@ MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * 
 
 COMMANDS = {
     SELF_TEST: ("self-test", "self_test = true"),
-    SAMPLE_AT: ("sample at", 'report = "cells"'),
+    SAMPLE_AT: ("sample at", 'report = "cells" or ruler'),
     ZERO: ("zero of a pressure unit", "units"),
     THRESHOLD: ("threshold of a pressure unit", "units"),
     SUM_THRESHOLD: ("threshold of a weighted sum", "unit_sums"),

@@ -29,6 +29,13 @@ _ALL = (
         extra="test",
     ),
     Study(
+        "cell",
+        title="Resistive cells read by the time in which a column falls",
+        page="cell.md",
+        minutes=1,
+        sections=tables("levels wrong", materials=Section("tables:materials_table", sample="tables:materials_table")),
+    ),
+    Study(
         "chart",
         title="Speed against accuracy",
         page="chart.md",

@@ -41,16 +41,22 @@ class Drive:
 
 
 class Network:
-    """A sheet with ``pressed`` switches, (rows, columns) bool; ``bare`` ones have no diode and conduct both ways."""
+    """A sheet with ``pressed`` switches, (rows, columns) bool; ``bare`` ones have no diode and conduct both ways.
 
-    def __init__(self, circuit: Circuit, pressed: np.ndarray, bare: np.ndarray | None = None):
+    ``ohm``: resistances of the same shape, by default the circuit's ``switch_ohm``; ``bare`` switches have that.
+    """
+
+    def __init__(
+        self, circuit: Circuit, pressed: np.ndarray, bare: np.ndarray | None = None, ohm: np.ndarray | None = None
+    ):
         self.circuit = circuit
         self.pressed = np.asarray(pressed, bool)
         self.rows, self.columns = self.pressed.shape
         self.bare = np.zeros_like(self.pressed) if bare is None else np.broadcast_to(bare, self.pressed.shape)
         rows, columns = np.nonzero(self.pressed & ~self.bare)
         self.row_of, self.column_of = rows + self.columns, columns
-        self.cell_s = 1 / (circuit.switch_ohm + circuit.diode.series_ohm)
+        self.ohm = np.broadcast_to(circuit.switch_ohm if ohm is None else ohm, self.pressed.shape)
+        self.cell_s = 1 / (self.ohm[rows, columns] + circuit.diode.series_ohm)
         self.farads = _capacitances(circuit, self.rows, self.columns)
         self.siemens = self._resistors()
         pulls = [1 / circuit.column_pull_ohm] * self.columns + [1 / circuit.row_pull_ohm] * self.rows
@@ -87,7 +93,10 @@ def _capacitances(circuit: Circuit, rows: int, columns: int) -> np.ndarray:
         beside = np.arange(start, start + count - 1)
         between[beside, beside + 1] = circuit.neighbor_pf
     between += between.T
-    return np.asarray(PF * (np.diag(circuit.line_pf + between.sum(axis=1)) - between))
+    ground = np.full(rows + columns, circuit.line_pf)
+    if circuit.falling:
+        ground[:columns] += circuit.falling.column_pf
+    return np.asarray(PF * (np.diag(ground + between.sum(axis=1)) - between))
 
 
 def charge(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.design.circuit import patterns, phases, transient
+from contactfpga.design.circuit import falling, patterns, phases, transient
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels, Phase
 from contactfpga.design.circuit.values import Circuit, CircuitError, load_circuit
@@ -148,6 +148,9 @@ def check(circuit: Circuit, skin: Skin) -> None:
     """Raise :class:`CircuitError` if a Skin's sheet, with its guard lines, cannot work."""
     if skin.diodes == "none":
         raise CircuitError("diodes is 'none'; [circuit] describes sheets with a diode per switch, leave the table out")
+    if circuit.falling or skin.ruler:
+        falling.check(circuit, skin)
+        return
     found: Sequence[Problem] = problems(circuit, skin.row_lines, skin.column_lines, skin.diodes, skin.reads_rows)
     if found:
         raise CircuitError(str(found[0]))

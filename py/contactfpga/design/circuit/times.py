@@ -64,6 +64,8 @@ class Needs:
 @functools.lru_cache(maxsize=64)
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
     """Times, levels and currents of a sheet with these lines; 64x64 needs some 3 s."""
+    if circuit.falling:
+        raise CircuitError("there is [circuit.falling], whose columns fall through cells; these are times of switches")
     sheet = _Sheet(circuit, rows, columns, diodes)
     levels = sheet.levels
     settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
@@ -115,6 +117,8 @@ def recommended_us(skin: Skin, needs: Needs, margin: float = MARGIN) -> dict[str
 
 def check_times(circuit: Circuit, skin: Skin) -> None:
     """Raise :class:`CircuitError` if a time of the Skin is shorter than its circuit needs with :data:`MARGIN`."""
+    if circuit.falling:
+        return
     wanted = recommended_us(skin, needed_by(skin, circuit))
     short = {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
     if not short:

@@ -12,12 +12,15 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
+THERMAL_V = 8.617333e-5 * 300.15
+"""k T / q at 27 degrees Celsius, SPICE's default."""
+
 
 class CircuitError(ContactFPGAError, ValueError):
     """An impossible or unworkable circuit."""
 
 
-def _check_limits(where: str, values: Diode | Circuit) -> None:
+def _check_limits(where: str, values: Diode | Falling | Circuit) -> None:
     for one in dataclasses.fields(values):
         if not one.metadata:
             continue
@@ -47,12 +50,53 @@ class Diode:
     def __post_init__(self) -> None:
         _check_limits("diode", self)
 
+    def at(self, celsius: float) -> Diode:
+        """The same diode for formulas at 27 degrees Celsius, as it is at another temperature, by SPICE's law.
+
+        Band gap and exponent are those of silicon, 1.11 eV and 3, or for an emission below 1.3 of a Schottky diode,
+        0.69 eV and 2.
+        """
+        gap, power = (0.69, 2.0) if self.emission < 1.3 else (1.11, 3.0)
+        ratio = (celsius + 273.15) / 300.15
+        emission = self.emission * ratio
+        grown = ratio ** (power / self.emission) * math.exp((ratio - 1) * gap / (emission * THERMAL_V))
+        return dataclasses.replace(self, saturation_a=self.saturation_a * grown, emission=emission)
+
 
 SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
 """Small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
 SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
 """Small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
 DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Falling:
+    """Columns that are charged, float, and fall through resistive cells: the table ``[circuit.falling]``."""
+
+    column_pf: float = field(default=220.0, metadata={"limits": (1.0, 100_000.0, "pF")})
+    """Capacitor at each column."""
+    tolerance: float = field(default=0.05, metadata={"limits": (0.0, 0.5)})
+    """Relative tolerance of that capacitor."""
+    ruler_ohm: float = field(default=25_000.0, metadata={"limits": (100.0, 1e7, "ohm")})
+    """Resistor at each guard crossing."""
+    threshold_v: float = field(default=1.4, metadata={"limits": (0.1, 5.0, "V")})
+    """Level at which a pin changes its reading, between VIL and VIH."""
+    threshold_spread_v: float = field(default=0.3, metadata={"limits": (0.0, 2.0, "V")})
+    """Largest difference of an FPGA's threshold from that; its pins are alike."""
+    leak_ua: float = field(default=10.0, metadata={"limits": (0.0, 1000.0, "uA")})
+    """Largest leakage of a pin, in or out. An assumption: take the limit of your FPGA's data sheet."""
+    noise_mv: float = field(default=5.0, metadata={"limits": (0.0, 1000.0, "mV")})
+    """Standard deviation of a column's level at its threshold, from sample to sample. An assumption."""
+    edge_mv: float = field(default=100.0, metadata={"limits": (-3000.0, 3000.0, "mV")})
+    """Level that an edge of a motor's drive adds to all columns. An assumption."""
+    edge_us: float = field(default=0.2, metadata={"limits": (0.0, 1000.0, "us")})
+    """Time for which it does."""
+    edge_hz: float = field(default=39_900.0, metadata={"limits": (0.0, 1e6, "Hz")})
+    """Edges per second: two of each period of some 20 kHz."""
+
+    def __post_init__(self) -> None:
+        _check_limits("circuit.falling", self)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -91,6 +135,8 @@ class Circuit:
     pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
     """Largest permanent pin current; 8 mA is specified for pins of an iCE40 at 3.3 V and of an ECP5 with its usual
     drive strength."""
+    falling: Falling | None = None
+    """Columns that fall through resistive cells; None: switches pull them down."""
 
     def __post_init__(self) -> None:
         _check_limits("circuit", self)
@@ -117,9 +163,6 @@ LIMITS: dict[str, tuple[float, float, str]] = {
 }
 """Lowest and highest value, and unit, of a circuit's numbers."""
 
-THERMAL_V = 8.617333e-5 * 300.15
-"""k T / q at 27 degrees Celsius, SPICE's default."""
-
 
 def knee_v(diode: Diode) -> float:
     """Voltage above which Newton's method is limited."""
@@ -144,4 +187,6 @@ def _read(values: Any) -> Circuit:
         if missing:
             raise CircuitError(f"{missing[0]} is missing in [circuit.diode]; it needs all of its fields")
         given["diode"] = Diode(**fields)
+    if "falling" in given:
+        given["falling"] = Falling(**tomlfile.fields_of(Falling, "circuit.falling", given["falling"], CircuitError))
     return Circuit(**given)

@@ -5,6 +5,7 @@ Interaction", cited by equation number with misprints corrected; Johnson is K. L
 """
 
 from contactfpga.design.cover.answer import CoverError, NoSolution
+from contactfpga.design.cover.cell import ResistiveCell
 from contactfpga.design.cover.cells import Cells, cells_of
 from contactfpga.design.cover.felt import Felt, Sheet, feel
 from contactfpga.design.cover.hertz import Ball
@@ -31,6 +32,7 @@ __all__ = [
     "NoSolution",
     "Part",
     "Rectangle",
+    "ResistiveCell",
     "Sheet",
     "Switch",
     "cells_of",

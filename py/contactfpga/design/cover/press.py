@@ -13,6 +13,7 @@ import numpy as np
 
 from contactfpga.design.cover import foams, medium
 from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
+from contactfpga.design.cover.cell import ResistiveCell, read_cell
 from contactfpga.design.cover.hertz import Ball, HalfSpace
 from contactfpga.design.cover.layers import Body, Indentation, Layer, Spring
 from contactfpga.design.cover.patch import Part
@@ -125,6 +126,8 @@ class Cover:
     """Cap on each switch; None: the foam presses the switch's own face, flush with its surroundings."""
     cut: bool = False
     """Whether the foam is cut between the caps."""
+    cell: ResistiveCell | None = None
+    """Resistive cells in place of switches; ``switch`` then closes, without travel, at the force of their level."""
     modulus_pa: float = foams.find("Plastazote LD33").layer_pa
     """E of the foam in p = E e / (1 - e). A file may have ``foam`` in its place, a name of
     :data:`contactfpga.design.cover.foams.FOAMS`."""
@@ -142,6 +145,8 @@ class Cover:
         if not isinstance(self.cut, bool):
             raise CoverError(f"cut is {shown(self.cut)}; it must be true or false")
         self._check_caps()
+        if self.cell and self.model == "patch":
+            raise CoverError("the model 'patch' knows no force, by which cells change; take 'foam'")
         if self.share is None:
             return
         if self.model != "patch":
@@ -253,6 +258,11 @@ def read_cover(values: Any) -> Cover:
     for name, kind in (("switch", Switch), ("cap", Cap), ("bed", Bed)):
         if name in given:
             given[name] = _part(kind, name, given[name])
+    if "cell" in given:
+        if "switch" in given:
+            raise CoverError("[cover] has cell and switch; leave one of them out")
+        given["cell"] = cell = read_cell(given["cell"])
+        given["switch"] = cell.switch
     cover = Cover(**given)
     lengths = [("thickness_m", cover.thickness_m)]
     lengths += [("side_m", cover.cap.side_m)] if cover.cap else []
@@ -281,7 +291,9 @@ def _part(kind: type, name: str, values: Any) -> Any:
 def write_cover(cover: Cover) -> str:
     """The TOML tables that :func:`read_cover` reads back."""
     values = dataclasses.asdict(cover)
-    parts = {name: part for name in ("cap", "switch", "bed") if (part := values.pop(name)) is not None}
+    values.pop("switch" if cover.cell else "cell")
+    names = ("cap", "cell" if cover.cell else "switch", "bed")
+    parts = {name: part for name in names if (part := values.pop(name)) is not None}
     tables = "".join(f"\n[cover.{name}]\n" + _lines(part) for name, part in parts.items())
     return "\n[cover]\n" + _lines(values) + tables
 

@@ -67,7 +67,7 @@ def connectors_list(layout: Layout) -> str:
 
 
 def circuit_table(circuit: Circuit) -> str:
-    values = dataclasses.asdict(circuit)
+    values = {name: value for name, value in dataclasses.asdict(circuit).items() if value is not None}
     diode = values.pop("diode")
     lines = ["[circuit]", *(f"{name} = {value!r}" for name, value in values.items())]
     lines += ["", "[circuit.diode]", *(f"{name} = {value!r}" for name, value in diode.items())]

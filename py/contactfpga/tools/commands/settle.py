@@ -113,7 +113,7 @@ def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: flo
             "column_peak": round(needs.column_peak_ma, 4),
         },
         "problems": problems,
-        "circuit": circuit,
+        "circuit": {name: value for name, value in dataclasses.asdict(circuit).items() if value is not None},
     }
 
 

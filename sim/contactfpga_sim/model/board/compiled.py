@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import math
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
@@ -181,6 +182,20 @@ class CompiledBoard(CompiledModel):
             for given, lines in ((rows, skin.row_lines), (columns, skin.column_lines))
         )
         self._call("slow", *(each.tobytes() for each in factors))
+
+    def fall(self, seconds: np.ndarray, end: float, threshold: float) -> None:
+        """Let columns fall exponentially to ``end``, and past the pin's ``threshold`` after (row lines, column lines)
+        ``seconds`` of a selected row; both are shares of the way to ground. Guard lines are last."""
+        skin = self.skin
+        lines = np.empty_like(seconds)
+        lines[np.ix_(skin.line_of_row, skin.line_of_column)] = seconds
+        shares = -np.expm1(math.log1p(-threshold / end) / (lines * skin.clock_hz))
+        self._call("fall", shares.tobytes(), ctypes.c_double(end), ctypes.c_double(threshold))
+
+    def disturb(self, noise: float, edge: float, edge_s: float, edge_hz: float) -> None:
+        """Add noise of this standard deviation, and edges, to falling columns: shares of the way to ground."""
+        clocks = (self.skin.clock_hz / edge_hz, self.skin.clock_hz * edge_s) if edge_hz else (math.inf, 0.0)
+        self._call("disturb", *map(ctypes.c_double, (noise, edge, *clocks)))
 
     def load(self, readings: Iterable[int]) -> None:
         """Set the converter's input of each pressure unit; initially 0."""

@@ -21,6 +21,7 @@ from contactfpga_sim.model.scenes.felt import UnitReadings
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.model.scenes.scene import scene as make_scene
+from contactfpga_sim.model.sheet.falling import FallingSheet
 from contactfpga_sim.model.sheet.line import lines_of
 
 CHUNK_S = 0.2e-3
@@ -88,10 +89,18 @@ class VirtualBoard:
         self._scene = make_scene(self.skin, scene, cover)
         self._cover = cover
         self._touch: CellsAt | None = None
+        self._fingers = Scene(())
         self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
         """(rows, columns) bool: switches closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
-        if circuit is not None:
+        self._cells, self._contacts = None, contacts_of(self.skin, scene)
+        if circuit is not None and circuit.falling:
+            if cover is None or cover.cell is None:
+                raise ValueError("[circuit.falling] needs [cover.cell], whose resistance falls with the force")
+            self._cells, parts = FallingSheet(self.skin, circuit, cover.cell), circuit.falling
+            noise, edge = (1e-3 * mv / circuit.supply_v for mv in (parts.noise_mv, -parts.edge_mv))
+            self._board.disturb(noise, edge, 1e-6 * parts.edge_us, parts.edge_hz)
+        elif circuit is not None:
             self._board.settle(*lines_of(circuit, self.skin))
         elif slow_rows or slow_columns:
             raise ValueError("slow_rows and slow_columns are factors of a circuit's times; give the circuit")
@@ -125,7 +134,7 @@ class VirtualBoard:
             for one in fingers
         ]
         scene = Scene(tuple(placed))
-        self._touch = scene.on(self.skin, self._cover) if placed else None
+        self._touch, self._fingers = scene.on(self.skin, self._cover) if placed else None, scene
         if isinstance(self._units, UnitReadings):
             self._units.touching = scene
 
@@ -135,7 +144,21 @@ class VirtualBoard:
         self.pressed = pressed if touch is None else pressed | touch(self.clock())
         if self.skin.units:
             self._board.load(self._units(self.clock()))
-        self._board.hold(self.pressed[None], cycles)
+        if self._cells is None:
+            self._board.hold(self.pressed[None], cycles)
+            return
+        times_s = self._cells.times_s(self._cells.ohm(self._forces_n(), self.clock()))
+        self._board.fall(times_s, self._cells.end, self._cells.threshold)
+        self._board.hold(np.ones((1, *self.pressed.shape), bool), cycles)
+
+    def _forces_n(self) -> np.ndarray:
+        """Forces on resistive cells; under a scene that knows none, four times their level on those pressed."""
+        assert self._cover is not None
+        assert self._cells is not None
+        now, fingers = self.clock(), self._fingers.forces_n(self.clock(), self.skin, self._cover)
+        if self._contacts is None:
+            return fingers + 4 * self._cells.cell.level_n * self._scene(now)
+        return fingers + self._contacts.forces_n(now, self.skin, self._cover)
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""

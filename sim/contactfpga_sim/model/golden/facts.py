@@ -99,7 +99,7 @@ class Facts:
     @property
     def samples_early(self) -> bool:
         """Whether columns can be sampled before the settle time ends."""
-        return self.skin.report == "cells"
+        return self.skin.report == "cells" or self.skin.ruler > 0
 
     @property
     def first_sample(self) -> int:

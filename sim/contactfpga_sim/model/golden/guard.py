@@ -57,6 +57,11 @@ class FaultyLines:
         reported[place] = ((found | kept) & ~self._masked[lines])[place]
 
     @property
+    def open_columns(self) -> np.ndarray:
+        """(columns,) bool: columns reported open."""
+        return self._reported["columns"]
+
+    @property
     def word(self) -> int:
         """Report word, from the lowest bit: rows, columns, stuck columns, guard column."""
         bits = np.concatenate([self._reported[name] for name in ("rows", "columns", "stuck")])

@@ -62,12 +62,11 @@ def _asked_before(facts: Facts, slot: int) -> int:
 def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
     """The first ``count`` scans; requests are in order of reception."""
     result = []
-    for index in range(count):
+    for index, (ahead, _) in enumerate(_instants(facts, timeline, requests, count)):
         slots = row_slots(facts, index)
         begin = strobe(facts, slots[0])
         late = _asked_before(facts, slots[0])
         early = _asked_before(facts, slots[0] - facts.row_lines) if index else 0
-        ahead = early_clocks(facts, requests, late)
         result.append(
             Scan(
                 cells=np.array([_read(facts, timeline, slot, ahead)[: facts.columns] for slot in slots]) & ~facts.mask,
@@ -80,6 +79,33 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
             )
         )
     return result
+
+
+def _instants(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[tuple[int, bool]]:
+    """By frame the clocks by which samples precede the settle time's end, and whether rows are checked."""
+    slots = [row_slots(facts, frame)[0] for frame in range(count)]
+    if not facts.skin.ruler:
+        early = [early_clocks(facts, requests, _asked_before(facts, slot)) for slot in slots]
+        return [(clocks, not clocks) for clocks in early]
+    lines, found = FaultyLines(facts), []
+    for frame, slot in enumerate(slots):
+        start = facts.row_shift + (slot - 1) * facts.row_clocks
+        asked = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
+        level = asked[-1] if asked and 1 <= asked[-1] <= 255 else facts.skin.ruler
+        ignored = lines.open_columns | facts.mask.all(axis=0)
+        fallen = next(
+            (clocks for clocks in range(1, facts.settle + 1) if _fell(facts, timeline, start + clocks - 1, ignored)), 0
+        )
+        instant = max(facts.first_sample, fallen * level // 16) if fallen else facts.settle
+        found.append((max(0, facts.settle - instant), not fallen or level >= 24))
+        lines.check("columns", ~_read(facts, timeline, slot - 1)[: facts.columns], _renews(facts, frame))
+    return found
+
+
+def _fell(facts: Facts, timeline: Timeline, cycle: int, ignored: np.ndarray) -> bool:
+    """Whether all columns that are not ``ignored``, and one at least, read pressed in the guard row's slot."""
+    low = (closed(facts, timeline, cycle)[-1] | stuck(facts, timeline, cycle))[: facts.columns]
+    return bool((low | ignored).all() and (low & ~ignored).any())
 
 
 def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
@@ -136,15 +162,14 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
     if not facts.skin.guard:
         return [[]] * count
     faulty, result = FaultyLines(facts), []
-    for frame in range(count):
+    for frame, (_, checks_rows) in enumerate(_instants(facts, timeline, requests, count)):
         changes, renews = [], _renews(facts, frame)
         slots = row_slots(facts, frame)
-        ahead = early_clocks(facts, requests, _asked_before(facts, slots[0]))
         faulty.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
         changes.append((strobe(facts, slots[0] - 1) + 1, faulty.word))
         for row, slot in enumerate(slots):
             whole = _read(facts, timeline, slot)[-1]
-            if not ahead:
+            if checks_rows:
                 faulty.check("rows", np.full(facts.rows, not whole), renews, row)
             if slot == slots[-1]:
                 faulty.check("stuck", _stuck(facts, timeline, frame), renews)

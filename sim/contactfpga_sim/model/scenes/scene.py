@@ -75,15 +75,23 @@ class Scene:
         """(rows, columns) bool: closed switches at a time. ``cover``: None for a bare sheet, whose switches close under
         a contact whatever its force. ``before``: switches closed until then, for hysteresis. ``skin.mask`` is ignored,
         as the gateware applies it."""
-        loads = self.on_cover(skin, cover).loads(seconds)
-        if skin.closed:
-            loads = all_loads(loads, sheet(skin).left, around_m(skin))
+        loads = self._loads(seconds, skin, cover)
         pitch_x, pitch_y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
         if cover is not None and cover.model != "patch":
             return cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y, self.drawn).closed(loads, before)
         return (cover or Cover()).under(
             loads, np.arange(skin.columns) * pitch_x, np.arange(skin.rows)[:, None] * pitch_y
         )
+
+    def forces_n(self, seconds: float, skin: Skin, cover: Cover) -> np.ndarray:
+        """(rows, columns) force on each cell at a time, under a cover that goes by force."""
+        pitch_x, pitch_y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
+        cells = cells_of(cover, skin.rows, skin.columns, pitch_x, pitch_y, self.drawn)
+        return cells.forces_n(self._loads(seconds, skin, cover))
+
+    def _loads(self, seconds: float, skin: Skin, cover: Cover | None) -> list[Load]:
+        loads = self.on_cover(skin, cover).loads(seconds)
+        return all_loads(loads, sheet(skin).left, around_m(skin)) if skin.closed else loads
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
         """:meth:`pressed` on this sheet as a function of time. Hysteresis depends on the previous call, so times should

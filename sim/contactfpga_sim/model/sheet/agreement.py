@@ -129,14 +129,16 @@ def installed() -> bool:
     return shutil.which("ngspice") is not None
 
 
-def run(phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0) -> tuple[np.ndarray, np.ndarray]:
+def run(
+    phase: Phase, seconds: float, steps: int = 2000, celsius: float = 27.0, leak_a: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """(n,) seconds and (n, lines) volts under the phase's last drive; ``celsius``: of the diodes, 27 in the project's
-    model."""
+    model; ``leak_a``: out of each column."""
     if not installed():
         raise MissingTool("the comparison", "ngspice", "apt install ngspice")
     with tempfile.TemporaryDirectory() as folder:
         deck, table = Path(folder, "sheet.cir"), Path(folder, "volts.txt")
-        deck.write_text(netlist(phase, seconds, steps, table, celsius), encoding="ascii")
+        deck.write_text(netlist(phase, seconds, steps, table, celsius, leak_a), encoding="ascii")
         done = subprocess.run(
             ["ngspice", "-b", deck.name], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
@@ -153,7 +155,7 @@ SCHOTTKY_GAP = "EG=0.69 XTI=2"
 """Band gap and exponent of a Schottky diode's temperature in SPICE."""
 
 
-def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0) -> str:
+def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: float = 27.0, leak_a: float = 0.0) -> str:
     """Deck that settles under the first drive, and writes time and volts of all lines."""
     lines = phase.network.rows + phase.network.columns
     end = sum(phase.seconds) + seconds
@@ -168,6 +170,7 @@ def netlist(phase: Phase, seconds: float, steps: int, table: Path, celsius: floa
             f"{SCHOTTKY_GAP if diode.emission < 1.3 else ''})",
             f".model pin SW(RON={phase.network.circuit.drive_ohm} ROFF={OPEN_OHM} VT=0.5 VH=0)",
             *_parts(phase.network),
+            *(f"Il{column + 1} {column + 1} 0 {leak_a}" for column in range(phase.network.columns) if leak_a),
             *_pins(phase),
             ".control",
             "set filetype=ascii",
@@ -189,6 +192,8 @@ def _parts(network: Network) -> Iterator[str]:
         yield f"Cg{line} {line} 0 {circuit.line_pf}p"
         if line not in (columns, rows + columns) and circuit.neighbor_pf:
             yield f"Cn{line} {line} {line + 1} {circuit.neighbor_pf}p"
+        if line <= columns and circuit.falling:
+            yield f"Cc{line} {line} 0 {circuit.falling.column_pf}p"
         pull = circuit.column_pull_ohm if line <= columns else circuit.row_pull_ohm
         yield f"Rp{line} {line} {'supply' if line <= columns else 0} {pull}"
     yield f"Vsupply supply 0 {circuit.supply_v}"
@@ -200,7 +205,7 @@ def _parts(network: Network) -> Iterator[str]:
             if network.pressed[row, column] and network.bare[row, column]:
                 yield f"Rx{name} {upper} {lower} {circuit.switch_ohm}"
             elif network.pressed[row, column]:
-                yield f"Rx{name} {upper} x{name} {circuit.switch_ohm}"
+                yield f"Rx{name} {upper} x{name} {network.ohm[row, column]}"
                 yield f"Dx{name} x{name} {lower} junction"
 
 

@@ -6,10 +6,11 @@ import argparse
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.tools.commands.wire import bounce, settle
+from contactfpga.tools.commands.wire import bounce, rest, settle
 from contactfpga.tools.console import flags, live, numbers
 
 EXTRA = None
+_MEASUREMENTS = {"bounce": bounce, "settle": settle, "rest": rest}
 
 
 def add_flags(flag: flags.Flags) -> None:
@@ -19,28 +20,31 @@ def add_flags(flag: flags.Flags) -> None:
     flag("--bounce", bounces)
     settles = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
     flag("--settle", settles)
+    rests = "Measure the level at which each resistive cell reads pressed without a touch, and the lightest that holds."
+    flag("--rest", rests)
     flag("--seconds S", "Seconds of device time to measure for (default: until Ctrl-C).", numbers.SECONDS)
     flags.json(flag, "Print one JSON object with what was measured.")
 
 
 def run(args: argparse.Namespace) -> int:
-    if args.bounce and args.settle:
-        raise ContactFPGAError("--bounce and --settle are two measurements; make one after the other")
-    if args.bounce or args.settle:
+    asked = [f"--{name}" for name in _MEASUREMENTS if getattr(args, name)]
+    if len(asked) > 1:
+        raise ContactFPGAError(f"{asked[0]} and {asked[1]} are two measurements; make one after the other")
+    if asked:
         return _measure(args)
     for name in ("seconds", "json"):
         if getattr(args, name):
-            raise ContactFPGAError(f"--{name} needs a measurement; add --bounce or --settle")
+            raise ContactFPGAError(f"--{name} needs a measurement; add --bounce, --settle or --rest")
     return _show(args)
 
 
 def _measure(args: argparse.Namespace) -> int:
     if args.once:
-        what = "bounce" if args.bounce else "settle time"
+        what = "bounce" if args.bounce else "settle time" if args.settle else "rest level"
         raise ContactFPGAError(f"--once shows one frame, which tells of no {what}; leave it out")
     with flags.opened(args) as board:
         _check_cells(board)
-        return bounce.measure(board, args) if args.bounce else settle.measure(board, args)
+        return next(module for name, module in _MEASUREMENTS.items() if getattr(args, name)).measure(board, args)
 
 
 def _show(args: argparse.Namespace) -> int:

@@ -43,6 +43,8 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 
 def settling(board: Board, skin: Skin) -> Settling:
+    if skin.ruler:
+        raise ContactFPGAError(f"{board.port} has resistive cells, whose times follow the force; take --rest")
     derived = skin.derived
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
@@ -84,7 +86,7 @@ def follow(
         except (PortLost, ReadTimeout, NoSuchCommand) as error:  # what was found is worth having all the same
             findings.append(Finding("fault", str(error)))
         finally:
-            findings += _restored(board, timeout)
+            findings += restored(board, timeout)
     return past_us / 1e6, findings
 
 
@@ -93,7 +95,8 @@ def _cells(zones: Zones) -> np.ndarray:
     return zones.cells
 
 
-def _restored(board: Board, timeout: float) -> list[Finding]:
+def restored(board: Board, timeout: float) -> list[Finding]:
+    """Sample as the Skin says again; returns a finding if that failed."""
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
         with interrupt.usual_end():
             try:

@@ -45,6 +45,12 @@ public:
     bool slow_rows = false;
     double rise_share[COLUMN_LINES + 1], lifted[COLUMN_LINES + 1], fall_share = 1, row_threshold = 0.5;
 
+    // Columns that fall through resistive cells: by the lines of row and column the share of its way that a column goes in
+    // a clock. Added to their levels: noise of this deviation, drawn when a row is selected, and a motor's edges, which
+    // come every so many clocks and last for some.
+    std::vector<double> cell_share;
+    double noise = 0, edge = 0, edge_every = 0, edge_for = 0;
+
     Matrix() {
         std::fill_n(row_end_, ROW_LINES, COLUMN_LINES);
         std::fill_n(column_end_, COLUMN_LINES, ROW_LINES);
@@ -80,6 +86,8 @@ public:
     Word levels(Word selected, Word rows_released, Word columns_driven, Word columns_held) {
         [[maybe_unused]] const Word selected_rows = selected;
         Word reads = 0, lifted = columns_driven;
+        if (!cell_share.empty())
+            disturb(selected);
         if (selected)
             selected_ = lowest(selected);
         if (shorts.any) {
@@ -133,7 +141,31 @@ private:
     double volts_[COLUMN_LINES] = {};
     unsigned selected_ = 0;  // the line that is driven, or was last
 
+    double added_[COLUMN_LINES] = {}, edge_clock_ = 0;
+    bool was_selected_ = false;
+    uint64_t random_ = 0x9E3779B97F4A7C15ull;
+
+    // By xorshift64* (Vigna 2016), above 0 and at most 1.
+    double uniform() {
+        random_ ^= random_ >> 12;
+        random_ ^= random_ << 25;
+        random_ ^= random_ >> 27;
+        return ((random_ * 0x2545F4914F6CDD1Dull >> 11) + 1) * 0x1p-53;
+    }
+
+    void disturb(Word selected) {
+        edge_clock_ += 1;
+        if (edge_clock_ >= edge_every)
+            edge_clock_ -= edge_every;
+        if (selected && !was_selected_ && noise)
+            for (double &added : added_)  // Box and Muller's
+                added = noise * std::sqrt(-2 * std::log(uniform())) * std::cos(6.283185307179586 * uniform());
+        was_selected_ = selected != 0;
+    }
+
     double share(double usual, bool pull, unsigned column) const {
+        if (pull && !cell_share.empty())
+            return cell_share[selected_ * COLUMN_LINES + column];
         if (row_factor.empty())
             return usual;
         return -std::expm1(std::log1p(-usual) / (column_factor[column] * (pull ? row_factor[selected_] : 1)));
@@ -190,13 +222,14 @@ private:
     Word settled(Word pulls, Word columns_driven) {
         Word reads = 0;
         const unsigned together = count(pulls);
+        const double all = edge_clock_ < edge_for ? edge : 0;
         for (unsigned column = 0; column < COLUMN_LINES; column++) {
             const bool pull = pulls >> column & 1;
             if (columns_driven >> column & 1 && !pull)
                 volts_[column] = 0;
             volts_[column] +=
                 ((pull ? pulled[together] : 0) - volts_[column]) * share(pull ? press_share[together] : release_share, pull, column);
-            reads |= Word{volts_[column] > threshold} << column;
+            reads |= Word{volts_[column] + added_[column] + all > threshold} << column;
         }
         return reads;
     }
@@ -433,6 +466,17 @@ EXPORT void board_settle(
     }
     matrix.release_share = release_share;
     matrix.threshold = threshold;
+}
+// By the lines of row and column; `end` is the share of the way to ground at which a column stays.
+EXPORT void board_fall(Board *board, const double *share, double end, double threshold) {
+    Matrix &matrix = board->matrix;
+    matrix.cell_share.assign(share, share + ROW_LINES * COLUMN_LINES);
+    matrix.slow = true, matrix.release_share = 0, matrix.threshold = threshold;
+    std::fill_n(matrix.pulled, COLUMN_LINES + 1, end);
+}
+EXPORT void board_disturb(Board *board, double noise, double edge, double edge_every, double edge_for) {
+    Matrix &matrix = board->matrix;
+    matrix.noise = noise, matrix.edge = edge, matrix.edge_every = edge_every, matrix.edge_for = edge_for;
 }
 EXPORT void board_settle_rows(
     Board *board, const double *rise_share, const double *lifted, double fall_share, double threshold) {

@@ -1,0 +1,1 @@
+"""Resistive cells read by the time in which a column falls."""

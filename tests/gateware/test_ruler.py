@@ -1,0 +1,62 @@
+"""Samples at a multiple of the clocks in which the columns fall through the ruler.
+
+What only this kills: a ruler that counts a clock too many or too few, that waits for a column reported open or masked,
+or that reads a level, a lost ruler or a late fall otherwise than the golden model, whose cells close at any clock.
+"""
+
+import numpy as np
+import pytest
+from sample import sample
+
+from contactfpga import Skin
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import command
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
+
+TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True, "precharge_us": 2, "release_us": 4}
+SKINS = {
+    "zones": Skin(rows=3, columns=4, ruler=32, settle_us=24, **TINY),
+    "cells, masked": Skin(rows=2, columns=3, ruler=20, report="cells", mask=((0, 1), (1, 1)), settle_us=20, **TINY),
+    "one row, mirrored": Skin(rows=1, columns=2, ruler=8, diodes="row2col", fail_safe=True, settle_us=30, **TINY),
+    "shift registers": Skin(rows=4, columns=2, ruler=20, row_drive="74hc595", alive=True, settle_us=30, **TINY),
+}
+
+
+def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
+    """In each slot columns read pressed from a random clock on: columns cut from the guard row, and cells, until then.
+    Sometimes a column never does, for several frames; levels are commanded at any time."""
+    known, cuts, pieces, received, broken = facts(skin), {}, {}, [], np.zeros(skin.columns, bool)
+    for frame in range(frames):
+        start = known.row_shift + frame * known.scan_clocks
+        if rng.random() < 0.15:
+            late = frame > 2 * frames // 3  # what is reported open stays so for longer than this test
+            broken = rng.random(skin.columns) < rng.choice([0, 0.4, 1]) * (late | (np.arange(skin.columns) == 0))
+        last = known.settle + 2 if rng.random() < 0.1 else 1 + known.settle // 2
+        fall = np.where(broken, known.row_clocks, rng.integers(0, last, skin.columns))
+        for clock in (-1, *{*fall.tolist()}):
+            cuts[max(0, start + clock)] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows))
+        for at in range(start + known.row_clocks, start + known.scan_clocks, known.row_clocks):
+            cuts[at - 1] = Cuts({0: skin.columns} if rng.random() < 0.05 else {})
+            close = rng.integers(0, known.settle + 3, skin.columns)
+            pieces |= {at + clock: np.tile(close <= clock, (skin.rows, 1)) for clock in (-1, *close.tolist())}
+    at = 10 * known.scan_clocks
+    for number, value in enumerate(rng.permutation([0, 1, 12, 23, 24, 64, 255, 256]).tolist(), 129 * 128 + 1):
+        received.append((at, command(number, 2, value, False, known.bit_clocks)))
+        at += 140 * known.bit_clocks + int(rng.integers(10, 4 * known.scan_clocks))
+    return Timeline(
+        [(at, pieces[at], None) for at in sorted(pieces)], received, [(at, cuts[at]) for at in sorted(cuts)]
+    )
+
+
+@pytest.mark.parametrize("name", sample(SKINS, quick=["zones", "cells, masked"], slow=["shift registers"]))
+def test_each_frame_is_sampled_where_the_golden_model_says(name):
+    skin, frames = SKINS[name], 90
+    timeline = falling(skin, np.random.default_rng(len(name)), frames)
+    cycles = frames * facts(skin).scan_clocks
+    expected = predict(skin, timeline, cycles)
+    plain = predict(skin.replace(ruler=255), timeline, cycles)
+    assert [row[1] for row in expected.rows] != [row[1] for row in plain.rows], "no sample was moved"
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100

@@ -1,0 +1,83 @@
+"""Columns that fall through resistive cells, on the compiled board, and the example's file from force to frame.
+
+What only this kills: a row sampled at another multiple of the ruler than asked for, times at the wrong crossing, noise
+or edges of another size, and forces that do not become readings.
+"""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import contactfpga
+from contactfpga.design.cover import load_cover
+from contactfpga.shipped import examples
+from contactfpga.skin import Skin
+from contactfpga.tools import cli
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.receiver import Receiver
+from contactfpga_sim.model.scenes.scene import palm
+
+SKIN = Skin(rows=3, columns=4, ruler=24, report="cells", guard=True, precharge_us=1, release_us=2, settle_us=30,
+            row_order=(2, 0, 1), column_order=(1, 3, 0, 2))  # fmt: skip
+END, THRESHOLD = 0.9, 0.6
+
+
+def read(clocks, frames, noise=(0.0, 0.0, 0.0, 0.0)):
+    """(frames, rows, columns) cells of a board whose columns fall in these (row lines, column lines) clocks."""
+    with CompiledBoard(SKIN) as board:
+        board.fall(clocks / SKIN.clock_hz, END, THRESHOLD)
+        board.disturb(*noise)
+        board.hold(np.ones((1, SKIN.rows, SKIN.columns), bool), (frames + 2) * SKIN.derived.frame_clocks)
+        received = board.take("received")
+    stream = zip(received["cycle"].tolist(), received["data"].tolist())
+    return np.array([one.frame.bitmap for one in Receiver(SKIN).take(stream)][1 : frames + 1])
+
+
+@pytest.mark.parametrize("ruler", [37.0, 101.0])
+def test_a_cell_reads_pressed_if_it_falls_within_the_multiple_of_the_rulers_time(ruler):
+    clocks = np.random.default_rng(int(ruler)).uniform(2.0, 300.0, (SKIN.row_lines, SKIN.column_lines))
+    clocks[-1], clocks[:-1, -1] = [0.9 * ruler, ruler, 0.8 * ruler, 0.9 * ruler, np.inf], ruler
+    cells, sample = clocks[:-1, :-1], 24 / 16 * ruler
+    assert 0.2 < (cells < sample).mean() < 0.9
+    sure = np.abs(cells - sample) > 3
+    assert (read(clocks, 5)[:, sure] == (cells < sample)[sure]).all()
+
+
+def test_noise_and_edges_turn_as_many_readings_as_they_should():
+    """The ruler's noise moves a frame's samples as much as the cell's own, as both have the same share of their way to
+    go: a level a standard deviation of the noise from the threshold reads wrong in 24 % of samples."""
+    clocks, frames = np.full((SKIN.row_lines, SKIN.column_lines), 60.0), 2_000
+    clocks[-1] = [60.0, 40.0, 40.0, 40.0, np.inf]
+    sampled, sigma = 90.0, 0.01
+    for column, away in enumerate((-2.0, -1.0, 0.0, 1.0)):
+        share = THRESHOLD - away * sigma  # of the way, at the sample
+        clocks[:-1, column] = sampled * math.log1p(-THRESHOLD / END) / math.log1p(-share / END)
+    pressed = read(clocks, frames, (sigma, 0.0, 0.0, 0.0)).mean(axis=(0, 1))
+    usual = [(1 + math.erf(-away / 2)) / 2 for away in (-2.0, -1.0, 0.0, 1.0)]
+    assert pressed == pytest.approx(usual, abs=0.06)  # a clock is 0.4 of the noise's deviation
+    assert (np.diff(pressed) < -0.02).all()
+    clocks[:-1, :-1] = 87.0
+    for lasts_s, period_s in ((20e-6, 73e-6), (5e-6, 73e-6)):
+        missed = 1 - read(clocks, 1_500, (0.0, -0.06, lasts_s, 1 / period_s)).mean()
+        hit = lasts_s / period_s
+        assert hit * (1 - hit) - 0.05 < missed < hit + 0.02  # an edge at the ruler moves the sample beyond the next one
+
+
+@pytest.mark.slow
+def test_the_example_reads_a_palm_by_its_forces_and_tells_its_rest(capsys):
+    file = examples() / "cells.toml"
+    skin, cover = Skin.load(file), load_cover(file)
+    levels = palm(skin).forces_n(0.0, skin, cover) / cover.cell.level_n
+    with contactfpga.open(f"sim://?scene=palm&skin={file}", timeout=30.0) as board:
+        cells, lighter = board.read().cells, board.sample_at(20).cells
+    assert cells[levels > 1.5].all()
+    assert not cells[levels < 1 / 1.5].any()
+    assert lighter.sum() > cells.sum() > 40
+    untouched = ["--skin", str(file), f"sim://?scene=nothing&skin={file}"]
+    assert cli.main(["wire", "--rest", "--json", "--seconds", "0.1", *untouched]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["lightest"], answer["levels"]) == (None, [[None] * 16] * 16)
+    assert cli.main(["wire", "--settle", *untouched]) == 1
+    assert "take --rest" in capsys.readouterr().err
