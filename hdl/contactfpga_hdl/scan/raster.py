@@ -1,5 +1,7 @@
 """Raster scan."""
 
+from typing import Any
+
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
@@ -34,7 +36,8 @@ class _Slots:
 class _Sample:
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
-        self.early = Const(0)  # before the settle time is over
+        self.early: Value = Const(0)  # before the settle time is over
+        self.moved: Any = None  # the sample's clock, where a command or the ruler moves it
         skin = derived.skin
         self.of_driven = Signal()  # high for a clock: it is there, and was taken while a row was driven
         self.of_row = Signal()  # and this is one of the sheet's rows
@@ -130,7 +133,7 @@ class Scanner(wiring.Component):
             live = ~reader.levels if skin.selects_low else reader.levels
             begun, clock_of = slots.following[0] & (slots.clock == 0), slots.clock
             under_way = sample.is_guard & (clock_of >= 2) & (clock_of <= self.derived.settle_clocks + 1)
-            self._ruler.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
+            sample.moved.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
         # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),
@@ -188,13 +191,14 @@ class Scanner(wiring.Component):
         if self.skin.ruler:
             from contactfpga_hdl.scan.ruler import Ruler
 
-            self._ruler = chosen = Ruler(m, self.derived, self.moves, self.clocks, slots.begins_rows)
+            sample.moved = Ruler(m, self.derived, self.moves, self.clocks, slots.begins_rows)
         else:
             from contactfpga_hdl.scan.sample_at import SampleAt
 
-            chosen = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
-        sample.early = chosen.early
-        return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
+            sample.moved = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
+        sample.early = sample.moved.early
+        moved = sample.moved.clock
+        return Mux(sample.is_guard, sample.moved.settle, moved) if self.skin.guard else moved
 
     def _keep_sample(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
         derived = self.derived

@@ -100,7 +100,12 @@ def corners(circuit: Circuit, rows: int, columns: int, leak_ua: float) -> Iterat
     """The ruler's slowest column and a cell's, at all corners of temperature, threshold, leakage, capacitor and pressed
     neighbors. Temperature and threshold are those of both; leakage and capacitor are each column's own."""
     spread, tolerance, worst = parts(circuit).threshold_spread_v, parts(circuit).tolerance, leak_ua * 1e-6
-    patterns = ({}, {"together": columns}, {"together": columns, "others": rows - 1}, {"beside": 2})
+    patterns: tuple[dict[str, int], ...] = (
+        {},
+        {"together": columns},
+        {"together": columns, "others": rows - 1},
+        {"beside": 2},
+    )
     for celsius, threshold, leak, other, end, pattern in itertools.product(
         (COLD_C, USUAL_C, HOT_C), (-spread, 0.0, spread), (-worst, worst), (-worst, worst), (-1, 1), patterns
     ):

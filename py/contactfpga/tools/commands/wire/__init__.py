@@ -44,7 +44,8 @@ def _measure(args: argparse.Namespace) -> int:
         raise ContactFPGAError(f"--once shows one frame, which tells of no {what}; leave it out")
     with flags.opened(args) as board:
         _check_cells(board)
-        return next(module for name, module in _MEASUREMENTS.items() if getattr(args, name)).measure(board, args)
+        ended: int = next(one for name, one in _MEASUREMENTS.items() if getattr(args, name)).measure(board, args)
+        return ended
 
 
 def _show(args: argparse.Namespace) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+import numpy as np
+
 from contactfpga import terminal
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
@@ -11,6 +13,7 @@ from contactfpga.instruments.rest import NEVER, Rest
 from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
 from contactfpga.tools.commands.wire.settle import restored
 from contactfpga.tools.console import interrupt, results
+from contactfpga.zones.zone import Zones
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
@@ -24,7 +27,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     with interrupt.usual_end():
         try:
             while (level := rest.next_level()) is not None:
-                rest.take(level, board.sample_at(level, args.timeout).cells)
+                rest.take(level, _cells(board.sample_at(level, args.timeout)))
             if args.seconds is not None:
                 _follow(board, rest, args.seconds, args.timeout)
         finally:
@@ -42,10 +45,15 @@ def _follow(board: Board, rest: Rest, seconds: float, timeout: float) -> None:
     zones = board.sample_at(0, timeout)
     end_us = zones.time_us + seconds * 1e6
     while zones.time_us < end_us:
-        if rest.quiet(bool(zones.cells.any()), zones.time_us):
+        if rest.quiet(bool(_cells(zones).any()), zones.time_us):
             level = rest.probe()
-            rest.renew(level, board.sample_at(level, timeout).cells)
+            rest.renew(level, _cells(board.sample_at(level, timeout)))
         zones = board.sample_at(0, timeout)
+
+
+def _cells(zones: Zones) -> np.ndarray:
+    assert zones.cells is not None, "a bare Skin reports cells"
+    return zones.cells
 
 
 def _show(rest: Rest, ruler: int, high: list[tuple[int, int]]) -> None:
