@@ -63,7 +63,6 @@ class Point:
     errors: dict[str, dict[str, Interval]]
     times: Times
     luts: int | None
-    fmax_mhz: float | None
     host_us: float = 0.0
 
 
@@ -87,11 +86,11 @@ def study(
         )
         for task in dict.fromkeys(tasks)
     }
-    places = {skin: executor.submit(_size, skin) for skin in skins}
+    counted = {skin: executor.submit(_luts, skin) for skin in skins}
     names: dict[Future[Any], str] = {
         **dict.fromkeys((pieces for pieces, _ in parts.values()), "placements"),
         **dict.fromkeys((timed for _, timed in parts.values()), "times"),
-        **dict.fromkeys(places.values(), "place and route"),
+        **dict.fromkeys(counted.values(), "synthesis"),
     }
     owners = {future: task for task, (pieces, timed) in parts.items() for future in (pieces, timed)}
     found = {} if so_far is None else so_far
@@ -106,12 +105,10 @@ def study(
         if pieces.done() and timed.done():
             measured = intervals(pieces.result())
             passed = times.summed(timed.result(), task.skin)
-            found[task] = Point(task, measured, passed, None, None)
-    return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
-
-
-def _sized(point: Point, size: sizes.Size) -> Point:
-    return dataclasses.replace(point, luts=size.luts, fmax_mhz=size.fmax_mhz)
+            found[task] = Point(task, measured, passed, None)
+    if not with_size:
+        return [found[task] for task in tasks]
+    return [dataclasses.replace(found[task], luts=counted[task.skin].result()) for task in tasks]
 
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
@@ -181,8 +178,8 @@ def _scene_errors(
     return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
 
 
-def _size(skin: Skin) -> sizes.Size:
-    return size.measure(lambda: Top(skin), DEVICE, seeds=1)
+def _luts(skin: Skin) -> int:
+    return size.luts(lambda: Top(skin), DEVICE)
 
 
 def _key(task: Task, kind: str, number: int) -> str:

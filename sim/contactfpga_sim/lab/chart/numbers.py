@@ -17,7 +17,7 @@ from contactfpga_sim.lab.chart.times import Times
 QUANTILES = ("touch_median_us", "touch_q95_us", "electric_median_us", "electric_q95_us")
 ENDS = ("", "_low", "_high", "_count")
 ERRORS = tuple(f"{kind}_{name}" for kind in KINDS for name in METRICS)
-SINGLE = ("bytes", "lower_bound_us", "host_us", "luts", "fmax_mhz")
+SINGLE = ("bytes", "lower_bound_us", "host_us", "luts")
 FIELDS = (
     *("family", "method", "placements", "seed"),
     *(name + end for name in (*QUANTILES, "not_felt") for end in ENDS),
@@ -86,8 +86,7 @@ def _point(line: dict[str, str], methods: Mapping[str, Method]) -> Point:
         bytes=float(line["bytes"]),
         lower_bound_us=float(line["lower_bound_us"]),
     )
-    luts, fmax = (float(line[name]) if line[name] else None for name in ("luts", "fmax_mhz"))
-    return Point(task, errors, times, None if luts is None else int(luts), fmax, float(line["host_us"]))
+    return Point(task, errors, times, int(line["luts"]) if line["luts"] else None, float(line["host_us"]))
 
 
 def _values(line: dict[str, str], name: str) -> tuple[float, float, float, int]:
