@@ -58,12 +58,22 @@ class SharedLine:
             self._take_to(known)
             self._changed.notify_all()
 
+    def next_take(self, cycle: int) -> int | None:
+        """Cycle of the next packet, as known in ``cycle``; None: none waits."""
+        waiting = self._waiting(cycle)
+        return waiting[0] if waiting else None
+
+    def _waiting(self, known: int) -> tuple[int, int] | None:
+        """(cycle, sheet) of the next packet."""
+        found = (self._first(number, known) for number in self.links)
+        return min((one for one in found if one is not None), default=None)
+
     def _take_to(self, cycle: float) -> None:
         if cycle == math.inf:
             return
         known = int(cycle)
-        while waiting := [found for number in self.links if (found := self._first(number, known)) is not None]:
-            taken, number = min(waiting)
+        while waiting := self._waiting(known):
+            taken, number = waiting
             if taken > known:
                 return
             self._first_asked = (number + 1) % self._sheets
@@ -141,8 +151,10 @@ class Link:
         self._slot_over = None
 
     def slot_over(self, cycle: int) -> int | None:
-        """Cycle in which the whole slot was taken, if not after ``cycle``."""
-        self.advance(cycle)
+        """Cycle in which the whole slot was taken, if not after ``cycle``. The wire advances no farther, as the next slot
+        may be offered before ``cycle``."""
+        while self._slot and (taken := self._line.next_take(cycle)) is not None and taken <= cycle:
+            self.advance(taken)
         return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None
 
     def advance(self, cycle: int) -> None:
