@@ -35,7 +35,7 @@ def packets(skin: Skin, trace: golden.Trace) -> list[tuple[int, bytes]]:
     """(cycle of the first byte, unsealed packet) of every whole packet in a trace."""
     found, begun, data = [], None, bytearray()
     for cycle, value in trace.bytes:
-        begun = cycle if begun is None else begun
+        begun = cycle if data in (b"", b"\0") else begun  # a second delimiter, or the one in front of a hello
         data.append(value)
         if value == protocol.DELIMITER and len(data) > 1:
             found.append((begun, protocol.unseal(bytes(data[:-1]).lstrip(b"\0"), protocol.check_prefix(skin))))

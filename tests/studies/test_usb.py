@@ -59,7 +59,7 @@ def test_a_packet_that_no_timer_meets_takes_a_microframe_to_the_digit():
 def test_every_phase_is_that_of_a_chip_stepped_frame_by_frame(seed):
     rng = random.Random(seed)
     chip = rng.choice([FAST, SLOW, dataclasses.replace(FAST, high_speed=False), Bridge("tiny", (0, 0), None, 1, True)])
-    settings = BridgeSettings(chip, rng.choice([1, 2, 3]), rng.choice([0, 0, None]))
+    settings = BridgeSettings(chip, rng.choice([1, 2, 3]), rng.choice([0, 0, None]), rng.choice([1, 4, 10]))
     period = settings.period_us * MHZ
     packets, at = [], -2 * period
     while at < period:
@@ -71,8 +71,7 @@ def test_every_phase_is_that_of_a_chip_stepped_frame_by_frame(seed):
     byte = rng.choice(inside)
     late = delivered(settings, CLOCK_HZ, line, byte)
     assert late.weight.sum() == pytest.approx(1)
-    frame = settings.chip.frame_us * MHZ
-    origin = line.since - line.since % frame
+    origin = line.since - line.since % (settings.chip.frame_us * MHZ // settings.asks)
     count = 300
     for number in range(count):
         share = (number + 0.377) / count
@@ -115,6 +114,14 @@ def test_a_delimiter_that_is_the_first_byte_of_its_packet_closes_none():
     assert chip.take(2000) == [b"\0"]
     late = delivered(BridgeSettings(FAST), CLOCK_HZ, stream(packet(1000, 17)), 16)
     assert late.worst - late.quantile(0.99) > 800
+
+
+@pytest.mark.parametrize("asks", [1, 10])
+def test_a_second_delimiter_closes_what_meets_an_emptied_chip(asks):
+    line = stream(packet(1000, 18), since=-48_000)
+    line.values[-2] = 0
+    late = delivered(BridgeSettings(FAST, asks=asks), CLOCK_HZ, line, 16)
+    assert late.worst <= end_us(line, 17) + 125 / asks + HIGH_US[17] + 1e-9
 
 
 def test_what_cannot_be_told_is_refused():

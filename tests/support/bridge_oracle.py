@@ -25,4 +25,4 @@ def brute(settings, mhz, line, byte, phase_us):
             if byte in packet:
                 return at + bus_us
         sent = at if ready else sent
-        at += settings.chip.frame_us
+        at += settings.chip.frame_us / settings.asks

@@ -64,7 +64,8 @@ class History:
         for place in range(count):
             if place == heard_at and any(hello for _, hello in self.board.hear(asked)):
                 parts.append(self.board.hello())
-            parts.append(random_frame(self.board, self.rng) if self.rng.random() < 0.98 else self.happening())
+            again = b"\0" * (self.rng.random() < 0.3)  # a second delimiter
+            parts.append(random_frame(self.board, self.rng) + again if self.rng.random() < 0.98 else self.happening())
         return b"".join(damaged(part, self.rng) if self.rng.random() < 0.005 else part for part in parts)
 
     def happening(self):

@@ -61,7 +61,9 @@ class Link(wiring.Component):
     number (in): number of the last request.
     faults, slots (in): with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
     units (in): with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
-    bytes (out): stuffed packets; a byte is offered two clocks after the one before was taken.
+    bytes (out): stuffed packets; a byte is offered two clocks after the one before was taken. If the Skin ``rests``,
+        a second delimiter follows a packet, unless another packet is taken in the clock after the first one. Several
+        sheets have none.
     upset (out): high while two frames share a region because a bit of its number flipped by itself; never with
         ``dual``, which finds more.
     grant (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.RoundRobin`;
@@ -72,6 +74,7 @@ class Link(wiring.Component):
         self.skin = skin
         self.place = place
         self.derived = skin.derived
+        self._rests = place is None and self.derived.rests
         self._hello = stored_hello(skin, place)
         self._offset_bits = offset_bits(skin, place)
         super().__init__(
@@ -207,6 +210,7 @@ class Link(wiring.Component):
         last = len(closing) - 1
         tail = Signal(range(len(closing)))
         ends = Signal()  # the packet, with this byte
+        ended = Signal()  # a packet, and its delimiter was not repeated
         goes = hello, frame, either = hello_due, regions.waits & ~hello_due, hello_due | regions.waits
         if self.place is not None:
             hello, frame, either = (one & self.grant for one in goes)
@@ -230,6 +234,10 @@ class Link(wiring.Component):
                 ]
                 with m.If(either):
                     m.next = "FETCH"
+                if self._rests:
+                    with m.Elif(ended):
+                        m.d.sync += [ended.eq(0), tail.eq(last)]
+                        m.next = "TAIL"
                 for other in others:
                     with m.If(other.choose(m, hello_due, regions.waits)):
                         m.d.comb += wire.take_frame.eq(0)
@@ -245,7 +253,7 @@ class Link(wiring.Component):
                 m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(byte)]
                 with m.If(self.bytes.ready):
                     m.d.comb += check.valid.eq(~leads)
-                    m.d.sync += [wire.offset.eq(wire.offset + 1), tail.eq(0)]
+                    m.d.sync += [wire.offset.eq(wire.offset + 1), tail.eq(0), *([ended.eq(1)] * self._rests)]
                     m.next = "FETCH"
             with m.State("TAIL"):
                 m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(Array(closing)[tail])]

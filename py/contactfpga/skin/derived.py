@@ -35,6 +35,8 @@ KEEP_ALIVE_BIT = 10
 
 EPOCH_BITS = 22
 """Log2 of an epoch in us, below half of a frame time's range."""
+LATENCY_US = 1000
+"""Shortest latency timer of an FTDI bridge, after which it sends what it holds."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
 
@@ -329,6 +331,14 @@ class Derived(Widths):
     def keep_alive_toggles(self) -> int:
         """Toggles of ``KEEP_ALIVE_BIT`` after which a waiting scan sends a frame."""
         return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_toggles
+
+    @property
+    def rests(self) -> bool:
+        """Whether the pause between frames may outlast a bridge's latency timer, so that a packet may meet a bridge
+        that empties itself in the middle of it; a second delimiter then closes what is left."""
+        on_change = self.skin.send == "on_change"
+        pause_us = 1000 * self.skin.keep_alive_ms if on_change else self.frame_clocks / self.clocks_per_us
+        return pause_us > LATENCY_US
 
     @property
     def min_keep_alive_ms(self) -> float:

@@ -35,6 +35,8 @@ def add_flags(flag: flags.Flags) -> None:
     own = health.LATENCY_MS
     timer = f"Latency timer of the bridge in ms (default: {own}, as `contactfpga doctor` advises; a new bridge has 16)."
     flag("--timer MS", timer, numbers.whole(1, 255, "ms"), own)
+    asks = "Requests of the host per USB frame or microframe, evenly spaced (default: 1, the worst; EHCI: about 10)."
+    flag("--asks N", asks, numbers.whole(1, 100), 1)
     flag("--no-event-char", "Take a bridge without event character, as a new one is.")
     flag("--exact", "Leave out the host's share, which is measured on this machine and varies.")
     flag("--picture FILE", "Draw a bar for each stage, SVG or PNG by the ending.")
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     board = named or boards.find(BOARD)
     skin = board.load(file) if named and file else Skin.load(file) if file else named.skin if named else Skin()
     event = None if args.no_event_char else health.EVENT_CHAR & 0xFF
-    settings = BridgeSettings(board.bridge, args.timer, event)
+    settings = BridgeSettings(board.bridge, args.timer, event, args.asks)
     with pool.progress() as step:
         touches = 0 if args.exact else host.TOUCHES
         found = stages.measure(skin, settings, args.cells, args.touches, host_touches=touches, step=step)
@@ -86,7 +88,8 @@ def _host_lines(title: str, found: Finger, exact: bool) -> list[tuple[str, str]]
 
     settings, share = found.settings, found.host
     event = "no event character" if settings.event is None else f"event character {settings.event}"
-    every = f"{settings.chip.frame_us} us" if settings.chip.high_speed else "1 ms"
+    every_us = settings.chip.frame_us / settings.asks
+    every = f"{every_us:g} us" if every_us < 1000 else "1 ms"
     bridge = f"{settings.chip.chip} of {title}, asked every {every}, latency timer {settings.timer_ms} ms, {event}"
     lines = [
         ("bridge", bridge),

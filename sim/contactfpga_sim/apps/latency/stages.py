@@ -56,6 +56,7 @@ class Finger:
                 "frame_us": self.settings.chip.frame_us,
                 "latency_timer_ms": self.settings.timer_ms,
                 "event_character": self.settings.event,
+                "requests_per_frame": self.settings.asks,
             },
             "last_byte_to_host_us": dataclasses.asdict(self.bridge_us),
             "touch_to_host_us": dataclasses.asdict(self.usb_us),

@@ -7,9 +7,10 @@ even if empty.
 By the USB 2.0 specification: frames of 1 ms and microframes of 125 us (5.3.3), the largest packets (5.8.3), and a
 packet's time on the bus (tables 5-9 and 5-10).
 
-Assumed: the host asks once at the start of each frame or microframe, and the chip sends all closed packets in order.
-Real controllers ask again within a frame, so bytes may be up to one frame earlier. The timer counts frames. The bus is
-otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
+Assumed: the host asks at the start of each frame or microframe, and if stated several times within it, evenly spaced;
+the chip sends all closed packets in order. The EHCI specification suggests that a controller whose devices had nothing
+to send asks them again after 10 us ("Restarting Asynchronous Schedule Before EOF"). The timer counts frames. The bus
+is otherwise idle, without errors or bit stuffing, and a byte is in the chip when its stop bit ends.
 """
 
 from __future__ import annotations
@@ -54,6 +55,8 @@ class BridgeSettings:
     timer_ms: int = LATENCY_MS
     event: int | None = EVENT_CHAR & 0xFF
     """Event character; None: none."""
+    asks: int = 1
+    """Requests of the host per frame or microframe."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.timer_ms <= LONGEST_TIMER_MS:
@@ -62,12 +65,12 @@ class BridgeSettings:
     @property
     def period_us(self) -> int:
         """Period of the timer's packets without bytes."""
-        return self.period_frames * self.chip.frame_us
+        return self.period_asks // self.asks * self.chip.frame_us
 
     @property
-    def period_frames(self) -> int:
-        """Period of the timer's packets in frames or microframes."""
-        return math.ceil(1000 * self.timer_ms / self.chip.frame_us)
+    def period_asks(self) -> int:
+        """Period of the timer's packets, a whole number of frames or microframes, in requests of the host."""
+        return math.ceil(1000 * self.timer_ms / self.chip.frame_us) * self.asks
 
     def packet_us(self, data_bytes: int) -> float:
         """Bus time of a packet with this many UART bytes."""
@@ -90,7 +93,7 @@ class BridgeChip:
         self._coming.append((time, value))
 
     def take(self, now: float) -> list[bytes]:
-        """Packets that the host reads; call it at the start of each frame."""
+        """Packets that the host reads as it asks."""
         while self._coming and self._coming[0][0] <= now:
             self._receive(self._coming.popleft()[1])
         packets, self._closed = self._closed, []
@@ -143,14 +146,14 @@ class _Phases:
         self._times = np.asarray(stream.times, np.int64) * _TICKS_PER_CLOCK
         self._ends = np.append(self._times, _NEVER)
         self._until = stream.until * _TICKS_PER_CLOCK
-        self._frame = 2 * clock_hz * settings.chip.frame_us // 125
+        self._ask = 2 * clock_hz * settings.chip.frame_us // (125 * settings.asks)
         self._closing = self._closings(np.asarray(stream.values))
-        edges = np.unique(np.append(self._times % self._frame, 0))
-        ends = np.append(edges[1:], self._frame)
+        edges = np.unique(np.append(self._times % self._ask, 0))
+        ends = np.append(edges[1:], self._ask)
         since = stream.since * _TICKS_PER_CLOCK
-        frames = since - since % self._frame + np.arange(settings.period_frames) * self._frame
+        frames = since - since % self._ask + np.arange(settings.period_asks) * self._ask
         self._first = (frames[:, None] + (edges + ends) // 2).ravel()
-        self.widths = np.tile(ends - edges, settings.period_frames)
+        self.widths = np.tile(ends - edges, settings.period_asks)
 
     def _closings(self, values: np.ndarray) -> np.ndarray:
         """Last byte of a packet by its first, unless the timer ends it; the number of bytes if open."""
@@ -172,10 +175,10 @@ class _Phases:
         left = np.arange(len(opened))
         while len(left):
             start = opened[left]
-            by_timer = frames[left] + self._settings.period_frames
-            closed = -((self._first[left] - self._ends[self._closing[start]]) // self._frame)
+            by_timer = frames[left] + self._settings.period_asks
+            closed = -((self._first[left] - self._ends[self._closing[start]]) // self._ask)
             now = np.minimum(by_timer, closed)
-            at = self._first[left] + now * self._frame
+            at = self._first[left] + now * self._ask
             if (at > self._until).any():
                 raise ValueError(f"byte {byte} is not delivered before the stream ends; give more of what comes after")
             start, us = self._send(start, at, now == by_timer, byte)

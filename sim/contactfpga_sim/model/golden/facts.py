@@ -201,6 +201,14 @@ class Facts:
         return downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
 
     @property
+    def rests(self) -> bool:
+        """Whether a second delimiter follows a packet if nothing waits: of a single sheet whose frames may be more than
+        a millisecond apart."""
+        on_change = self.skin.send == "on_change"
+        ms = exact(self.skin.keep_alive_ms) if on_change else Fraction(self.scan_clocks, 1000 * self.clocks_per_us)
+        return self.place is None and ms > 1
+
+    @property
     def keep_alive_periods(self) -> int:
         """Keep-alive time in periods of 1024 us, for a scan that waits."""
         periods = exact(self.skin.keep_alive_ms) * 1000 / 1024

@@ -113,6 +113,8 @@ class Link:
         self._units = units
         self._swept = 0
         self._frames_since = 0
+        self._ended: int | None = None
+        """Cycle in which a second delimiter is sent if nothing waits."""
         self._line = line or SharedLine(1)
         self._number = 0 if facts.place is None else facts.place[0]
         self._line.links[self._number] = self
@@ -148,6 +150,9 @@ class Link:
         self._line.advance(self._number, cycle)
 
     def waits_from(self, cycle: int) -> int | None:
+        return min((at for at in (self._ended, self._waits_from(cycle)) if at is not None), default=None)
+
+    def _waits_from(self, cycle: int) -> int | None:
         due = self._due(cycle)
         frame_from = [self._frame[0]] if self._frame else []
         slot_from = [self._slot[0]] if self._slot else []
@@ -155,8 +160,11 @@ class Link:
         return min((*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept), default=None)
 
     def take(self, taken: int, cycle: int) -> None:
-        due = self._due(cycle)
-        if self._hellos and min(self._hellos) <= taken:
+        due, wait = self._due(cycle), self._waits_from(cycle)
+        if wait is None or wait > taken:
+            self._send(taken, b"\0")
+            self._ended = None
+        elif self._hellos and min(self._hellos) <= taken:
             self._hellos = [wait for wait in self._hellos if wait > taken]
             self._send_hello(taken)
         elif due is not None and due <= taken and not self._frame_is_next(taken):
@@ -236,3 +244,4 @@ class Link:
             cycle += self._byte_clocks
         self._line.uart_from = cycle
         self._line.idle_from = cycle - self._byte_clocks + 1
+        self._ended = self._line.idle_from if self._facts.rests else None

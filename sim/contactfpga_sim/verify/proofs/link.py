@@ -20,25 +20,30 @@ from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.streams import drain, feed
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
+_RESTS = _SKIN.replace(settle_us=2000)
+"""Its frames are over a millisecond apart, so a second delimiter may follow a packet."""
 _STATES = ("IDLE", "FETCH", "BYTE", "TAIL")
+_RESTING_STATES = ("IDLE", "FETCH", "TAIL", "BYTE")
+"""In the order of their numbers: that in which the link names them."""
 
 
-def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
+def packed_frames_are_sent(proof: Proof, hello: bytes, skin: Skin = _SKIN) -> None:
     """Free: items at any time, tag and summary, wishes for a hello, its numbers, when bytes are taken, and one followed
     place of a frame and of the hello. Assumed: a complete frame was written up to its end, as ``frames_are_packed``
     shows.
 
     Claimed: a sent frame has at that place what the packer wrote there; a sent hello follows the protocol except for
     the digits of its state, which are digits, the first two the frames sent. A packet's bytes are followed by check
-    bytes and one delimiter, then the next packet. A byte stays until it is taken; the next is offered two clocks later.
+    bytes and one delimiter, then the next packet; if the Skin rests and none is taken in the next clock, by one more
+    delimiter. A byte stays until it is taken; the next is offered two clocks later.
     Each complete frame is sent or counted as overwritten, and sequence numbers have no gap. The packer gets these
     numbers from the clock after ``decide`` until ``commit``. The link never asks for a restart.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
-        dut = _PackerAndLink()
+        dut = _PackerAndLink(skin)
         inside = proof.put(dut)
-        stored, first_word = stored_hello(_SKIN), hello_words(_SKIN).start
+        stored, first_word = stored_hello(skin), hello_words(skin).start
     place = proof.chosen(len(dut.packer.frames.end), "place")
     hello_place = proof.chosen(range(len(stored)), "hello_place")
     proof.given(hello_place < len(stored))
@@ -54,9 +59,9 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
         proof.given((packed.end != 0) & (frames.written_now | (place >= packed.end)))
     wire = _Wire(m, dut, inside, frames, len(stored))
     taken = inside["link.take_frame"] | inside["link.take_hello"]
-    proof.claim(~(taken & wire.busy) & ~(inside["link.take_frame"] & ~frames.waits))
-    proof.claim(~(dut.bytes.valid & ~wire.busy) & ~(packed.commit & frames.waits))
-    with m.If(wire.busy & ~proof.before(taken | dut.bytes.valid & dut.bytes.ready)):
+    proof.claim(~(taken & wire.sends) & ~(inside["link.take_frame"] & ~frames.waits))
+    proof.claim(~(dut.bytes.valid & ~wire.sends) & ~(packed.commit & frames.waits))
+    with m.If(wire.sends & ~proof.before(taken | dut.bytes.valid & dut.bytes.ready)):
         proof.claim(dut.bytes.valid)
     hello_byte = Array(stored)[hello_place]
     in_state = (wire.index >= protocol.STATE_OFFSET) & (wire.index < protocol.STATE_OFFSET + protocol.STATE_DIGITS)
@@ -70,7 +75,7 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
             proof.claim(dut.bytes.payload == hello_byte)
         with m.Elif(~wire.is_hello & (wire.index == place)):
             proof.claim(dut.bytes.payload == frames.sent_value)
-    with m.If(dut.bytes.valid & (wire.index == wire.length + CHECK_BYTES)):
+    with m.If(dut.bytes.valid & (wire.again | (wire.index == wire.length + CHECK_BYTES))):
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     with m.If(frames.closing):
         proof.claim(packed.verdict.sequence == frames.sent[: len(packed.verdict.sequence)])
@@ -82,8 +87,8 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
 
 
 class _PackerAndLink(wiring.Component):
-    def __init__(self) -> None:
-        self.packer, self.link = Packer(_SKIN, offset_bits(_SKIN)), Link(_SKIN)
+    def __init__(self, skin: Skin) -> None:
+        self.packer, self.link = Packer(skin, offset_bits(skin)), Link(skin)
         packer, link = self.packer.signature.members, self.link.signature.members
         names = ("tag", "summary", "asked", "epoch", "number", "bytes")
         super().__init__({"items": packer["items"], **{name: link[name] for name in names}})
@@ -139,10 +144,18 @@ class _Wire:
     def __init__(self, m: Module, dut: _PackerAndLink, inside: Inside, frames: _Frames, hello_length: int):
         self.busy, self.is_hello = Signal(name="busy"), Signal(name="is_hello")
         self.index = Signal(len(dut.packer.frames.end) + 1, name="index")
+        self.ended, self.again = Signal(name="packet_ended"), Signal(name="again")
+        self.sends = self.busy | self.again
         self.length = Mux(self.is_hello, hello_length, frames.sent_length)
+        taken = inside["link.take_frame"] | inside["link.take_hello"]
+        last = self.busy & (self.index == self.length + CHECK_BYTES)
+        self.rests = dut.link.derived.rests
+        if self.rests:
+            m.d.sync += self.ended.eq(last & dut.bytes.valid & dut.bytes.ready)
+            m.d.sync += self.again.eq(self.ended & ~taken | self.again & ~(dut.bytes.valid & dut.bytes.ready))
         with m.If(self.busy & dut.bytes.valid & dut.bytes.ready):
-            m.d.sync += [self.index.eq(self.index + 1), self.busy.eq(self.index != self.length + CHECK_BYTES)]
-        with m.If(inside["link.take_frame"] | inside["link.take_hello"]):
+            m.d.sync += [self.index.eq(self.index + 1), self.busy.eq(~last)]
+        with m.If(taken):
             m.d.sync += [self.busy.eq(1), self.index.eq(0), self.is_hello.eq(inside["link.take_hello"])]
 
 
@@ -161,8 +174,9 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
     proof.lemma(Cat(inside["link.frames_sent"], inside["link.overwritten"]) == Cat(frames.sent, frames.dropped))
     state, tail = inside["link.wire_state"], inside["link.tail"]
     offset, end = inside["link.offset"], inside["link.end"]
-    fetch, byte, in_tail = (state == _STATES.index(name) for name in ("FETCH", "BYTE", "TAIL"))
-    proof.lemma((state != 0) == wire.busy)
+    states = _RESTING_STATES if wire.rests else _STATES
+    fetch, byte, in_tail = (state == states.index(name) for name in ("FETCH", "BYTE", "TAIL"))
+    proof.lemma((state != 0) == wire.sends)
     proof.lemma(~wire.busy | (inside["link.is_hello"] == wire.is_hello))
     with m.If(wire.busy & ~wire.is_hello):
         proof.lemma((words[sending] == frames.sent_value) | (place >= frames.sent_length))
@@ -172,7 +186,11 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
         proof.lemma((wire.index < wire.length) | fetch & (wire.index == wire.length) & (tail == 0))
     _lemmas_on_state(proof, inside, wire, fetch, byte)
     with m.If(in_tail):
-        proof.lemma((tail <= CHECK_BYTES) & (wire.index == wire.length + tail))
+        proof.lemma((tail <= CHECK_BYTES) & Mux(wire.again, tail == CHECK_BYTES, wire.index == wire.length + tail))
+    if wire.rests:
+        proof.lemma((~wire.again | in_tail) & ~(wire.busy & wire.again) & ~(wire.ended & wire.sends))
+        begins = wire.busy & (wire.index == 0)
+        proof.lemma(begins | (inside["link.ended"] == (wire.ended | wire.busy)))
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
@@ -220,6 +238,7 @@ _BUGS = (
     Bug("a check byte short", Link, "wire_state", _check_byte_short),
     Bug("a loss is not counted", Link, "overwritten", lambda _, inside: inside["overwritten"]),
 )  # fmt: skip
+_REST_BUGS = (Bug("a third delimiter", Link, "ended", lambda ended, inside: ended | (inside["tail"] == CHECK_BYTES)),)
 _HELLO = protocol.encode_hello(_SKIN)
 _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames after it
 
@@ -325,6 +344,8 @@ CASES = (
     ProofCase("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
     ProofCase("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
               _BUGS, bug_clocks=40),
+    ProofCase("packed frames are sent", "1x2, cells, at rest, hello of 1 byte",
+              partial(packed_frames_are_sent, hello=_SHORT, skin=_RESTS), 3, _REST_BUGS, bug_clocks=40),
     ProofCase("the first frame is sent", "raster", partial(first_is_sent, scan="raster"), 2, _FIRST_BUGS),
     ProofCase("the first frame is sent", "line reversal", partial(first_is_sent, scan="reversal", precharge_us=1.0), 2),
     ProofCase("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
