@@ -9,12 +9,14 @@ import subprocess
 from pathlib import Path
 
 import c_vectors
+import numpy as np
 import pytest
 from c_compilers import COMPILERS, FOLDER, answers, program
 from frames import moments
 from model_board import ModelBoard
 from sample import sample
 from wire import FINGERPRINT, SHEET, digits, last_byte, old_frame, old_hello
+from zone_oracles import nearest
 
 from contactfpga import Skin
 from contactfpga.driver.conversation import Conversation, frames_in
@@ -26,6 +28,7 @@ from contactfpga.wire.units import Sweep
 from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
+from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.golden.uart import pulsed
 
 SKINS = [
@@ -40,6 +43,9 @@ SKINS = [
     Skin(rows=6, columns=7, connectivity=4, surface="cylinder", radius_mm=9.0, closed=True),
     Skin(rows=6, columns=5, guard=True, self_test=True, scan="reversal", precharge_us=0.25),
     Skin(rows=5, columns=4, units=3),
+    Skin(rows=6, columns=7, extent=True),
+    Skin(rows=5, columns=8, extent=True, report="barycenter", barycenter_bits=2, connectivity=4),
+    Skin(rows=7, columns=5, extent=True, surface="cylinder", radius_mm=9.0, closed=True),
 ]
 
 
@@ -105,7 +111,7 @@ def hello_line(hello: Hello) -> str:
     sheet = hello.sheet
     report = ["moments", "cells", "barycenter"].index(sheet.report)
     return (
-        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed} {report} {sheet.barycenter_bits} "
+        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed}{'e' * sheet.extent} {report} {sheet.barycenter_bits} "
         f"{int(hello.send == 'on_change')} {sheet.zone_capacity} {int(sheet.ghosts)} "
         f"{int(hello.guard)} {int(hello.self_test)} "
         f"{sheet.pitch_x_mm:.17g} {sheet.pitch_y_mm:.17g} {sheet.radius_mm or 0:.17g} {hello.fingerprint.hex()} "
@@ -131,6 +137,7 @@ def frame_line(zones: Zones) -> str:
     frame = zones.frame
     flags = sum(1 << bit for bit, name in enumerate(FLAGS) if name in frame.flags)
     items = frame.moments if frame.barycenters is None else frame.barycenters
+    items = items if frame.extents is None else np.concatenate([items, frame.extents], axis=1)
     words = [",".join(map(str, row)) for row in items.tolist()]
     if frame.bitmap is not None:
         words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
@@ -139,7 +146,9 @@ def frame_line(zones: Zones) -> str:
 
 
 def zones(rng, skin) -> list:
-    """Of zones that could be on the sheet."""
+    """Of zones that could be on the sheet; some of those with an extent could not."""
+    if skin.extent:
+        return extents(rng, skin)
     count = rng.choice([0, 1, 1, 2, min(skin.zone_capacity, 7)])
     if skin.report == "barycenter":
         most = skin.barycenter_bits
@@ -152,6 +161,22 @@ def zones(rng, skin) -> list:
         if row[0] <= left:
             left -= row[0]
             found.append(row)
+    return found
+
+
+def extents(rng, skin) -> list:
+    """Zones of random cells, now and then with a field that is one more or one less."""
+    cells = np.random.default_rng(rng.getrandbits(32)).random((skin.rows, skin.columns)) < rng.choice([0.1, 0.4, 0.7])
+    found = []
+    for zone in labelling(cells, skin.connectivity, skin.labeller, skin.closed).departures:
+        x, y = zone.sum_x, zone.sum_y
+        if skin.report == "barycenter":
+            x, y = (nearest(total, zone.area, skin.barycenter_bits) for total in (x, y))
+        record = [zone.area, x, y, *([zone.turned] if skin.closed else []), *zone.extent]
+        if rng.random() < 0.05:
+            place = rng.randrange(1, len(record))
+            record[place] = max(0, record[place] + rng.choice([-1, 1])) % (1 << skin.derived.record_bits[place])
+        found.append(tuple(record))
     return found
 
 

@@ -1,7 +1,6 @@
-"""Extents of zones from the compiled labellers, in every frame of small sheets, in shapes that break labellers, in noise
-and under stalls, by scipy on as many turns as a zone needs. Only these tests read an extent from the gateware alone: a
-turn that is added to the wrong part, or a complement of the wrong width, leaves sums, clocks and all other tests as they
-are."""
+"""Extents of zones from the compiled labellers, by scipy on as many turns of the sheet as a zone needs. A turn that is
+added to the wrong part of a zone, or a complement of the wrong width, changes no sum and no clock, so no other test of the
+labellers sees it."""
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from sample import sample
 from zone_oracles import RULES, every_frame, labeled, mazes, noise
 
 from contactfpga_sim.model.golden import all_departures, row_clocks
-from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.scenes import shapes
 
 RULE = pytest.mark.parametrize("rule", RULES, ids=str)

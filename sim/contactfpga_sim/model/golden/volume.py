@@ -28,8 +28,8 @@ class Departures:
     :func:`contactfpga_sim.model.golden.zones.turned`."""
 
     extents: np.ndarray
-    """(n, 4) int64: smallest and largest column, smallest and largest row, in that order, too; on closed sheets with the
-    columns of :func:`contactfpga_sim.model.golden.zones.closed_pieces`."""
+    """(n, 4) int64: smallest and largest column, smallest and largest row, in the same order; on closed sheets with
+    the columns of :func:`contactfpga_sim.model.golden.zones.closed_pieces`."""
 
     def sorted_moments(self) -> np.ndarray:
         """Moments, sorted by area, sum x, sum y within each frame."""
