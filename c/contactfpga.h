@@ -684,8 +684,8 @@ static inline bool contactfpga__read_zone(const contactfpga_reader *reader, uint
     return !contactfpga__bits(record, used, 8u * w->record_bytes - used);
 }
 
-/* Whether a zone may have its extent: the extent is on the sheet, has a place for each cell, is not longer or wider than
- * so many cells reach, and the barycenter is inside. */
+/* Whether a zone may have its extent: it is on the sheet, has a place for each cell, is not longer or wider than so many
+ * cells reach, and holds the barycenter. */
 static inline bool contactfpga__has_extent(const contactfpga_hello *hello, const contactfpga_zone *zone) {
     uint32_t columns = hello->columns, left = zone->left, right = zone->right;
     if (left >= columns || right >= columns || (left > right && !hello->closed)) return false;

@@ -111,7 +111,8 @@ def hello_line(hello: Hello) -> str:
     sheet = hello.sheet
     report = ["moments", "cells", "barycenter"].index(sheet.report)
     return (
-        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed}{'e' * sheet.extent} {report} {sheet.barycenter_bits} "
+        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed}{'e' * sheet.extent} {report} "
+        f"{sheet.barycenter_bits} "
         f"{int(hello.send == 'on_change')} {sheet.zone_capacity} {int(sheet.ghosts)} "
         f"{int(hello.guard)} {int(hello.self_test)} "
         f"{sheet.pitch_x_mm:.17g} {sheet.pitch_y_mm:.17g} {sheet.radius_mm or 0:.17g} {hello.fingerprint.hex()} "

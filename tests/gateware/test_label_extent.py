@@ -1,6 +1,8 @@
-"""Extents of zones from the compiled labellers, by scipy on as many turns of the sheet as a zone needs. A turn that is
-added to the wrong part of a zone, or a complement of the wrong width, changes no sum and no clock, so no other test of the
-labellers sees it."""
+"""Extents of zones from the compiled labellers, by scipy on as many turns of the sheet as a zone needs.
+
+A turn that is added to the wrong part of a zone, or a complement of the wrong width, changes no sum and no clock, so no
+other test of the labellers sees it.
+"""
 
 import numpy as np
 import pytest

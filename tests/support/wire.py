@@ -82,8 +82,10 @@ class Wire:
         self.overwritten_bits = -(-(counted + 4) // 8) * 8 - counted
 
     def record(self, area, sum_x, sum_y, *more) -> bytes:
-        """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell. ``more``: the
-        cells past the seam of a closed sheet, then an extent if the Skin has it; nothing stands for zeros."""
+        """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell.
+
+        more: the cells past the seam of a closed sheet, then an extent if the Skin has it; nothing stands for zeros.
+        """
         known = self.known
         widths = [known.area_bits] * self.skin.closed + [*known.extent_bits]
         rest = zip(more or [0] * len(widths), widths, strict=True)
