@@ -21,12 +21,11 @@ def stored_extent(derived: Derived) -> dict[str, int]:
     return {"left": columns, "right": columns, "top": rows, "bottom": rows}
 
 
-def extent_of_cells(derived: Derived, area: Value, first: Value, last: Value, y: Value) -> dict[str, Value]:
-    """The fields of ``area`` cells in row ``y``, from column ``first`` to ``last`` on the lower turn; 0 for no cell."""
+def extent_of_run(derived: Derived, first: Value, last: Value, y: Value) -> dict[str, Value]:
+    """The fields of cells in row ``y``, from column ``first`` to ``last`` on the lower turn."""
     columns, rows = derived.extent_bits[0], derived.extent_bits[2]
     lower = Cat((~first)[:columns], 1) if derived.skin.closed else (~first)[:columns]
-    fields = {"left": lower, "right": last[:columns], "top": (~y)[:rows], "bottom": y[:rows]}
-    return {"area": area, **{name: Mux(area != 0, field, 0) for name, field in fields.items()}}
+    return {"left": lower, "right": last[:columns], "top": (~y)[:rows], "bottom": y[:rows]}
 
 
 def lifted(derived: Derived, part: Extent | data.View, above: Value | int) -> dict[str, Value]:

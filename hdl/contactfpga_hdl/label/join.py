@@ -8,7 +8,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.extent import extent_of_cells
+from contactfpga_hdl.label.extent import extent_of_run
 from contactfpga_hdl.label.steps import join_layout, nesting, place_bits, place_of, step_layout, waiting
 from contactfpga_hdl.util.stack import Stack
 
@@ -283,11 +283,11 @@ class Join(wiring.Component):
         step = self.step
         extent = {}
         if self.derived.skin.extent:
-            extent = extent_of_cells(self.derived, step.area, step.start, step.past - 1, step.y)
+            extent = extent_of_run(self.derived, step.start, step.past - 1, step.y)
         below = Array(math.comb(column, 2) for column in range(self.derived.skin.columns + 1))
         return [
             run.area.eq(step.area),
             run.sum_x.eq(below[step.past] - below[step.start]),
             run.sum_y.eq(step.area * step.y),
-            *(run[name].eq(extent[name]) for name in extent if name != "area"),
+            *(run[name].eq(field) for name, field in extent.items()),
         ]
