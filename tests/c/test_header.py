@@ -12,11 +12,10 @@ import c_vectors
 import numpy as np
 import pytest
 from c_compilers import COMPILERS, FOLDER, answers, program
-from frames import moments
+from frames import moments, reaching
 from model_board import ModelBoard
 from sample import sample
 from wire import FINGERPRINT, SHEET, digits, last_byte, old_frame, old_hello
-from zone_oracles import nearest
 
 from contactfpga import Skin
 from contactfpga.driver.conversation import Conversation, frames_in
@@ -28,7 +27,6 @@ from contactfpga.wire.units import Sweep
 from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.golden.uart import pulsed
 
 SKINS = [
@@ -149,7 +147,7 @@ def frame_line(zones: Zones) -> str:
 def zones(rng, skin) -> list:
     """Of zones that could be on the sheet; some of those with an extent could not."""
     if skin.extent:
-        return extents(rng, skin)
+        return reaching(rng, skin)
     count = rng.choice([0, 1, 1, 2, min(skin.zone_capacity, 7)])
     if skin.report == "barycenter":
         most = skin.barycenter_bits
@@ -162,22 +160,6 @@ def zones(rng, skin) -> list:
         if row[0] <= left:
             left -= row[0]
             found.append(row)
-    return found
-
-
-def extents(rng, skin) -> list:
-    """Zones of random cells, now and then with a field that is one more or one less."""
-    cells = np.random.default_rng(rng.getrandbits(32)).random((skin.rows, skin.columns)) < rng.choice([0.1, 0.4, 0.7])
-    found = []
-    for zone in labelling(cells, skin.connectivity, skin.labeller, skin.closed).departures:
-        x, y = zone.sum_x, zone.sum_y
-        if skin.report == "barycenter":
-            x, y = (nearest(total, zone.area, skin.barycenter_bits) for total in (x, y))
-        record = [zone.area, x, y, *([zone.turned] if skin.closed else []), *zone.extent]
-        if rng.random() < 0.05:
-            place = rng.randrange(1, len(record))
-            record[place] = max(0, record[place] + rng.choice([-1, 1])) % (1 << skin.derived.record_bits[place])
-        found.append(tuple(record))
     return found
 
 
