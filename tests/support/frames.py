@@ -20,8 +20,8 @@ def moments(rng, skin, zones):
     return rows
 
 
-def reaching(rng, skin, wrong=0.05):
-    """Records with extents, of zones of random cells; ``wrong``: the chance of a field that is one more or less."""
+def reaching(rng, skin):
+    """Records with extents, of zones of random cells; now and then a field is one more or less."""
     cells = np.random.default_rng(rng.getrandbits(32)).random((skin.rows, skin.columns)) < rng.choice([0.1, 0.4, 0.7])
     found = []
     for zone in labelling(cells, skin.connectivity, skin.labeller, skin.closed).departures:
@@ -29,7 +29,7 @@ def reaching(rng, skin, wrong=0.05):
         if skin.report == "barycenter":
             x, y = (nearest(total, zone.area, skin.barycenter_bits) for total in (x, y))
         record = [zone.area, x, y, *([zone.turned] if skin.closed else []), *zone.extent]
-        if rng.random() < wrong:
+        if rng.random() < 0.05:
             place = rng.randrange(1, len(record))
             record[place] = max(0, record[place] + rng.choice([-1, 1])) % (1 << skin.derived.record_bits[place])
         found.append(tuple(record))

@@ -3,11 +3,9 @@
 Only these tests see rows taken for columns, an edge half a pitch off, or a box that is given to another zone.
 """
 
-import random
-
 import numpy as np
 import pytest
-from frames import frame_in, reaching
+from frames import frame_in
 from scipy import ndimage
 from wire import Wire
 
@@ -88,10 +86,3 @@ def test_an_extent_that_cannot_be_is_refused_unless_the_board_flags_a_mismatch(s
     frame = frame_in(wire.zones([record], flags=["mismatch"]), skin)
     assert frame.extents.tolist() == [list(record[-4:])]
     assert len(Zones(frame, skin.sheet)[0].box_mm) == 4
-
-
-@pytest.mark.parametrize("skin", [OPEN, DIVIDED, CLOSED], ids=str)
-def test_what_a_board_may_send_is_taken(skin):
-    rng = random.Random(3)
-    for _ in range(200):
-        assert zones_of(skin, reaching(rng, skin, wrong=0.0)) is not None

@@ -2,18 +2,19 @@
 
 ``left`` and ``top`` are stored as complements. So each field is the largest of its parts', and the 0 of an empty part
 changes nothing. On a sheet whose ends meet, the highest bit of a column says that it is on the upper of the group's two
-turns (:class:`~contactfpga_hdl.label.around.Unwrap`).
+turns (:class:`~contactfpga_hdl.label.around.Unwrap`). There the group's first cluster is, so an empty part may be put
+there, too.
 """
 
 from collections.abc import Iterable, Mapping
 
-from amaranth.hdl import Cat, Mux, Value
+from amaranth.hdl import Cat, Const, Mux, Value
 from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
 
 Extent = Mapping[str, Value]
-"""The area and the stored fields of cells, a group or a found group."""
+"""The stored fields of cells, a group or a found group."""
 
 
 def stored_extent(derived: Derived) -> dict[str, int]:
@@ -24,19 +25,18 @@ def stored_extent(derived: Derived) -> dict[str, int]:
 def extent_of_run(derived: Derived, first: Value, last: Value, y: Value) -> dict[str, Value]:
     """The fields of cells in row ``y``, from column ``first`` to ``last`` on the lower turn."""
     columns, rows = derived.extent_bits[0], derived.extent_bits[2]
-    lower = Cat((~first)[:columns], 1) if derived.skin.closed else (~first)[:columns]
-    return {"left": lower, "right": last[:columns], "top": (~y)[:rows], "bottom": y[:rows]}
+    left, right = (~first)[:columns], last[:columns]
+    if derived.skin.closed:
+        left, right = Cat(left, Const(1, 1)), Cat(right, Const(0, 1))
+    return {"left": left, "right": right, "top": (~y)[:rows], "bottom": y[:rows]}
 
 
-def lifted(derived: Derived, part: Extent | data.View, above: Value | int) -> dict[str, Value]:
+def lifted(derived: Derived, part: Extent | data.View, above: Value) -> dict[str, Value]:
     """The fields of a part whose cells are all on the upper turn if ``above``."""
     fields = {name: part[name] for name in stored_extent(derived)}
     if derived.skin.closed:
         left, right = fields["left"], fields["right"]
-        fields["left"] = Cat(left[:-1], left[-1] & ~above)
-        columns = derived.extent_bits[0]
-        turn = above & (part["area"] != 0) | (right[columns] if len(right) > columns else 0)
-        fields["right"] = Cat(right[:columns], turn)
+        fields |= {"left": Cat(left[:-1], left[-1] & ~above), "right": Cat(right[:-1], right[-1] | above)}
     return fields
 
 

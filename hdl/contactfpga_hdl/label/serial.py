@@ -315,7 +315,7 @@ class SerialLabeller(wiring.Component):
                 m.d.sync += group.moments[name].eq(group.moments[name] + more)
             if self.derived.skin.extent:
                 fields = extent_of_run(self.derived, walk.column, walk.column, walk.y)
-                cell = {"area": acts.adds, **{name: Mux(acts.adds, field, 0) for name, field in fields.items()}}
+                cell = {name: Mux(acts.adds, field, 0) for name, field in fields.items()}
                 kept, joins, adds = (
                     lifted(self.derived, *part) for part in zip((group.moments, found.moments, cell), above)
                 )
