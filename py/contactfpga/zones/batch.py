@@ -51,6 +51,8 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 
 @functools.cache
 def zone_dtype_of(divided: bool, extent: bool) -> np.dtype[np.void]:
+    """:data:`ZONE_DTYPE` or, with barycenters, :data:`DIVIDED_ZONE_DTYPE`; of a Skin with ``extent`` also the fields
+    ``box`` and ``box_mm`` of :class:`Zone`, four numbers each."""
     return np.dtype(_WHICH + dtype_of(divided, extent).descr)
 
 
@@ -68,7 +70,7 @@ class Batch:
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
     zones: np.ndarray
-    """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and of their zones."""
+    """(m,) of :func:`zone_dtype_of`, in the order of the frames and of their zones."""
     faults: tuple[tuple[str, ...], ...] = ()
     """:attr:`Zones.faults` of each frame."""
     first: int = 0

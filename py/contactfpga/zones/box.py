@@ -12,6 +12,11 @@ from contactfpga.skin.sheet import Sheet
 class Box(NamedTuple):
     """First and last column and row of a zone's cells, counted from 0.
 
+    >>> from contactfpga_sim import VirtualBoard
+    >>> with contactfpga.open(VirtualBoard(contactfpga.Skin(extent=True), scene="two_fingers")) as board:
+    ...     board.read()[0].box
+    Box(left=5, right=6, top=7, bottom=8)
+
     Around a cylinder columns are counted on over the seam: from ``left`` to the last column and on from column 0 to
     ``right`` if ``left > right``. A zone that goes all the way around has all columns.
     """
@@ -24,6 +29,11 @@ class Box(NamedTuple):
 
 class BoxMm(NamedTuple):
     """The outer edges of a :class:`Box`'s cells in mm, half a pitch beyond their centers; cell (0, 0) lies at 0.
+
+    >>> from contactfpga_sim import VirtualBoard
+    >>> with contactfpga.open(VirtualBoard(contactfpga.Skin(extent=True), scene="two_fingers")) as board:
+    ...     board.read()[0].box_mm.width_mm
+    20.0
 
     ``x_mm`` and ``y_mm`` are the edges at ``left`` and ``top``. Around a cylinder ``x_mm + width_mm`` may be beyond the
     seam.
