@@ -34,7 +34,7 @@ def clocks_table() -> str:
 
 
 def size_table() -> str:
-    sheets = ("open", "with extents", "closed", "with extents")
+    sheets = ("open", "open, extents", "closed", "closed, extents")
     head = ["labeller", "connectivity", *(f"{lines}x{lines}: {sheet}" for lines in (16, 32) for sheet in sheets)]
     rows = [[*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
             for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
