@@ -36,7 +36,7 @@ extern "C" {
 #endif
 
 #ifndef CONTACTFPGA_PACKET_BYTES
-#define CONTACTFPGA_PACKET_BYTES 16462
+#define CONTACTFPGA_PACKET_BYTES 22630
 #endif
 
 #define CONTACTFPGA_MAX_LINES 64
@@ -90,6 +90,7 @@ typedef struct {
     bool ghosts;          /* the sheet has no diodes */
     bool plane;           /* else a cylinder */
     bool closed;          /* its last column is a neighbor of the first */
+    bool extent;          /* its zones say how far they reach */
     bool guard;           /* it has guard lines, and names faults */
     bool self_test;       /* it can test its lines */
     uint16_t zone_capacity;
@@ -121,10 +122,12 @@ typedef struct {
 /* A contact zone. Its barycenter is sum_x / area along the columns, in cells, and sum_y / area along the rows; with
  * CONTACTFPGA_BARYCENTER the board has divided: x and y are in cells / 2^fraction_bits, and the sums are 0. On a closed
  * sheet ``turned`` cells lie past the seam, seen from the others: (sum_x + columns * turned) / area is the barycenter. A
- * zone that is a ring or wound has no x (docs/skin.md). */
+ * zone that is a ring or wound has no x (docs/skin.md). Of a board with ``extent`` columns left to right and rows top to
+ * bottom are the first and last ones with a cell of the zone; on a closed sheet, left above right is over the seam. */
 typedef enum { CONTACTFPGA_PLAIN = 0, CONTACTFPGA_RING = 1, CONTACTFPGA_WOUND = 2 } contactfpga_winding;
 typedef struct {
     uint32_t area, sum_x, sum_y, x, y, turned;
+    uint8_t left, right, top, bottom;
     contactfpga_winding winding;
 } contactfpga_zone;
 
@@ -146,7 +149,7 @@ typedef struct {
 
 /* Widths of a sheet's fields on the wire. */
 typedef struct {
-    uint8_t area, sum_x, sum_y, zones, overwritten, record[4], record_bytes, item_bytes, trailer_bytes;
+    uint8_t area, sum_x, sum_y, zones, overwritten, record[8], record_bytes, item_bytes, trailer_bytes;
     uint16_t cells, max_zones, max_items;
 } contactfpga_widths;
 
@@ -367,12 +370,16 @@ static inline contactfpga_widths contactfpga__widths(const contactfpga_hello *he
     w.sum_y = contactfpga__width(columns * (rows * (rows - 1) / 2));
     w.zones = contactfpga__width(w.max_zones);
     w.record[0] = w.area, w.record[1] = w.sum_x, w.record[2] = w.sum_y, w.record[3] = hello->closed ? w.area : 0;
+    w.record[4] = w.record[5] = hello->extent ? contactfpga__width(columns - 1) : 0;
+    w.record[6] = w.record[7] = hello->extent ? contactfpga__width(rows - 1) : 0;
     if (hello->report == CONTACTFPGA_BARYCENTER) {
         w.record[0] = contactfpga__width(w.cells - 1u);
         w.record[1] = contactfpga__width((columns - 1) << hello->fraction_bits);
         w.record[2] = contactfpga__width((rows - 1) << hello->fraction_bits);
     }
-    w.record_bytes = contactfpga__bytes((unsigned)w.record[0] + w.record[1] + w.record[2] + w.record[3]);
+    unsigned record = 0;
+    for (int i = 0; i < 8; i++) record += w.record[i];
+    w.record_bytes = contactfpga__bytes(record);
     w.item_bytes = hello->report == CONTACTFPGA_CELLS ? contactfpga__bytes(columns) : w.record_bytes;
     w.max_items = hello->report == CONTACTFPGA_CELLS ? hello->rows : hello->zone_capacity;
     unsigned counted = 24u + 8 + 3 + w.area + w.zones;
@@ -408,6 +415,7 @@ static inline bool contactfpga__may_be(const contactfpga_hello *hello) {
         && (hello->plane || contactfpga__is_length(hello->radius_mm)) && hello->rows >= 1 && hello->columns >= 1
         && hello->rows <= CONTACTFPGA_MAX_LINES && hello->columns <= CONTACTFPGA_MAX_LINES
         && hello->fraction_bits <= most_bits && (hello->connectivity == 4 || hello->connectivity == 8)
+        && !(hello->extent && hello->report == CONTACTFPGA_CELLS)
         && (!hello->closed || (hello->columns >= 3 && !hello->plane && hello->report != CONTACTFPGA_BARYCENTER))
         && hello->zone_capacity >= 1 && hello->zone_capacity <= contactfpga__max_zones(hello) && hello->clock_hz
         && hello->baud;
@@ -444,7 +452,7 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
     switch (kind) {
     case CONTACTFPGA__SHEET:
         hello->rows = value[0], hello->columns = value[1], hello->report = value[3];
-        hello->connectivity = value[2] & 0x7F, hello->closed = value[2] >> 7;
+        hello->connectivity = value[2] & 0x3F, hello->closed = value[2] >> 7, hello->extent = value[2] >> 6 & 1;
         hello->fraction_bits = value[4], hello->on_change = value[5] == 1;
         hello->zone_capacity = (uint16_t)(value[6] | value[7] << 8), hello->ghosts = value[8] == 1;
         hello->guard = value[9] & 1;
@@ -542,7 +550,7 @@ static inline bool contactfpga__same_sheet(const contactfpga_hello *one, const c
         && one->zone_capacity == other->zone_capacity && one->pitch_x_mm == other->pitch_x_mm
         && one->pitch_y_mm == other->pitch_y_mm && one->plane == other->plane
         && (one->plane || one->radius_mm == other->radius_mm) && one->closed == other->closed
-        && one->ghosts == other->ghosts
+        && one->extent == other->extent && one->ghosts == other->ghosts
         && !memcmp(one->fingerprint, other->fingerprint, sizeof one->fingerprint);
 }
 
@@ -658,19 +666,39 @@ static inline bool contactfpga__take_time(contactfpga_reader *reader, contactfpg
 static inline bool contactfpga__read_zone(const contactfpga_reader *reader, uint16_t index, contactfpga_zone *zone) {
     const contactfpga_widths *w = &reader->widths;
     const uint8_t *record = reader->packet + (size_t)index * w->record_bytes;
-    unsigned sums = (unsigned)w->record[0] + w->record[1] + w->record[2], used = sums + w->record[3];
-    uint32_t first = contactfpga__bits(record, w->record[0], w->record[1]);
-    uint32_t second = contactfpga__bits(record, (size_t)w->record[0] + w->record[1], w->record[2]);
+    uint32_t fields[8];
+    unsigned used = 0;
+    for (int i = 0; i < 8; used += w->record[i++]) fields[i] = contactfpga__bits(record, used, w->record[i]);
+    uint32_t first = fields[1], second = fields[2];
     bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
-    zone->area = contactfpga__bits(record, 0, w->record[0]);
+    zone->area = fields[0];
     if (divided && !zone->area && w->cells == 1u << w->record[0]) zone->area = w->cells;
     zone->sum_x = divided ? 0 : first, zone->sum_y = divided ? 0 : second;
     zone->x = divided ? first : 0, zone->y = divided ? second : 0;
-    zone->turned = contactfpga__bits(record, sums, w->record[3]);
+    zone->turned = fields[3];
+    zone->left = (uint8_t)fields[4], zone->right = (uint8_t)fields[5];
+    zone->top = (uint8_t)fields[6], zone->bottom = (uint8_t)fields[7];
     zone->winding = CONTACTFPGA_PLAIN;
     if (reader->hello.closed && zone->area && zone->turned >= zone->area)
         zone->winding = zone->turned == zone->area ? CONTACTFPGA_RING : CONTACTFPGA_WOUND;
     return !contactfpga__bits(record, used, 8u * w->record_bytes - used);
+}
+
+/* Whether a zone may have its extent: it is on the sheet, has a place for each cell, is not longer or wider than so many
+ * cells reach, and holds the barycenter. */
+static inline bool contactfpga__has_extent(const contactfpga_hello *hello, const contactfpga_zone *zone) {
+    uint32_t columns = hello->columns, left = zone->left, right = zone->right;
+    if (left >= columns || right >= columns || (left > right && !hello->closed)) return false;
+    if (zone->top > zone->bottom || zone->bottom >= hello->rows) return false;
+    uint32_t width = (right + columns - left) % columns + 1, height = zone->bottom - zone->top + 1u;
+    if (width > zone->area || height > zone->area || zone->area > width * height) return false;
+    bool divided = hello->report == CONTACTFPGA_BARYCENTER;
+    uint32_t scale = divided ? UINT32_C(1) << hello->fraction_bits : zone->area;
+    uint32_t x = divided ? zone->x : zone->sum_x, y = divided ? zone->y : zone->sum_y;
+    if (y < zone->top * scale || y > zone->bottom * scale) return false;
+    if (zone->winding != CONTACTFPGA_PLAIN) return left == 0 && right == columns - 1;
+    uint32_t along = (x + columns * zone->turned + (columns - left) * scale) % (columns * scale);
+    return width == columns || along <= (width - 1) * scale;
 }
 
 /* Zones that cannot be, or that do not add up; only asked where the board flags no mismatch. */
@@ -688,7 +716,7 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
         bool inside = zone.sum_x <= zone.area * most_x && zone.sum_y <= zone.area * most_y
             && zone.x <= most_x << hello->fraction_bits && zone.y <= most_y << hello->fraction_bits;
         if (zone.winding == CONTACTFPGA_WOUND && zone.turned + 1 != UINT32_C(1) << reader->widths.area) return false;
-        if (!zone.area || !inside) return false;
+        if (!zone.area || !inside || (hello->extent && !contactfpga__has_extent(hello, &zone))) return false;
         carried += zone.area;
     }
     bool overflow = hello->report != CONTACTFPGA_CELLS && frame->flags & CONTACTFPGA_OVERFLOW;

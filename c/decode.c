@@ -10,8 +10,8 @@
 static contactfpga_reader reader;
 
 static void show_hello(const contactfpga_hello *hello) {
-    printf("hello %ux%u %u%s %u %u %u %u %u %u %u ", hello->rows, hello->columns, hello->connectivity,
-        hello->closed ? "c" : "", hello->report, hello->fraction_bits, hello->on_change, hello->zone_capacity, hello->ghosts, hello->guard,
+    printf("hello %ux%u %u%s%s %u %u %u %u %u %u %u ", hello->rows, hello->columns, hello->connectivity,
+        hello->closed ? "c" : "", hello->extent ? "e" : "", hello->report, hello->fraction_bits, hello->on_change, hello->zone_capacity, hello->ghosts, hello->guard,
         hello->self_test);
     printf("%.17g %.17g %.17g ", hello->pitch_x_mm, hello->pitch_y_mm, hello->plane ? 0.0 : hello->radius_mm);
     for (int i = 0; i < 8; i++) printf("%02x", hello->fingerprint[i]);
@@ -37,6 +37,7 @@ static void show_frame(const contactfpga_frame *frame) {
     for (uint16_t i = 0; contactfpga_zone_at(&reader, i, &zone); i++) {
         printf(" %" PRIu32 ",%" PRIu32 ",%" PRIu32, zone.area, zone.sum_x + zone.x, zone.sum_y + zone.y);
         if (reader.hello.closed) printf(",%" PRIu32, zone.turned);
+        if (reader.hello.extent) printf(",%u,%u,%u,%u", zone.left, zone.right, zone.top, zone.bottom);
     }
     for (uint8_t row = 0; row < reader.hello.rows; row++)
         for (uint8_t column = 0; column < reader.hello.columns; column++)

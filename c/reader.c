@@ -31,6 +31,7 @@ enum {
     BYTES = 1 << 19,       /* of a ring, as are these */
     PACKETS = 1 << 14,
     RECORDS = 1 << 14,
+    MOST_COLUMNS = 8, /* of a record */
     READS = 1 << 13,
     HELD = 4096,           /* bytes that wait at most of packets that only Python decodes, as in a port's own buffer */
     MANY_PORTS = 8,        /* from here on a turn begins at most every PAUSE_NS */
@@ -71,7 +72,7 @@ typedef struct {
 
 /* What sheets are made of. */
 typedef struct {
-    uint32_t known, rows, columns, connectivity, report, fraction_bits, closed, zone_capacity, prefix;
+    uint32_t known, rows, columns, connectivity, report, fraction_bits, closed, extent, zone_capacity, prefix;
 } sheet;
 
 /* The newest frame; its fields, those of the one before it, and the records of both follow. */
@@ -112,7 +113,7 @@ typedef struct {
     fit fit;         /* after it */
     uint8_t *bytes;
     packet *packets;
-    int64_t *records; /* four for each */
+    int64_t *records; /* MOST_COLUMNS for each */
     read_ *reads;
 } port;
 
@@ -198,7 +199,12 @@ static bool read_frame(contactfpga_reader *decoder, size_t length, fields *out) 
     return true;
 }
 
-/* A record of the frame that was read, in four words. */
+/* Words of a record. */
+static unsigned columns_of(const sheet *told) {
+    return 3 + told->closed + 4 * told->extent;
+}
+
+/* A record of the frame that was read, in these words. */
 static void read_record(const contactfpga_reader *decoder, uint16_t index, int64_t *out) {
     contactfpga_zone zone;
     contactfpga__read_zone(decoder, index, &zone);
@@ -206,7 +212,9 @@ static void read_record(const contactfpga_reader *decoder, uint16_t index, int64
     out[0] = zone.area;
     out[1] = divided ? zone.x : zone.sum_x;
     out[2] = divided ? zone.y : zone.sum_y;
-    out[3] = zone.turned;
+    out += 3;
+    if (decoder->hello.closed) *out++ = zone.turned;
+    if (decoder->hello.extent) out[0] = zone.left, out[1] = zone.right, out[2] = zone.top, out[3] = zone.bottom;
 }
 
 /* The packet that ends before ``end``. */
@@ -220,7 +228,7 @@ static packet decode(port *p, uint64_t end) {
         uint16_t items = (uint16_t)found.frame.items;
         while (room && p->head.records + items - p->tail.records > RECORDS) room = drop_oldest(p);
         for (uint16_t i = 0; room && i < items; i++)
-            read_record(&p->decoder, i, p->records + 4 * (p->head.records++ % RECORDS));
+            read_record(&p->decoder, i, p->records + MOST_COLUMNS * (p->head.records++ % RECORDS));
         if (!room) memset(&found.frame, 0, sizeof found.frame);
     }
     found.records_end = p->head.records;
@@ -431,7 +439,7 @@ port *cfpga_open(int descriptor, double at_s) {
     p->data = malloc(CHUNK);
     p->bytes = malloc(BYTES);
     p->packets = malloc(PACKETS * sizeof *p->packets);
-    p->records = malloc(RECORDS * 4 * sizeof *p->records);
+    p->records = malloc(RECORDS * MOST_COLUMNS * sizeof *p->records);
     p->reads = malloc(READS * sizeof *p->reads);
     p->descriptor = -1;
     p->noticed_s = at_s;
@@ -494,6 +502,7 @@ static void set_sheet(contactfpga_reader *decoder, const sheet *told) {
     hello->rows = (uint8_t)told->rows, hello->columns = (uint8_t)told->columns;
     hello->connectivity = (uint8_t)told->connectivity, hello->report = (uint8_t)told->report;
     hello->fraction_bits = (uint8_t)told->fraction_bits, hello->closed = told->closed;
+    hello->extent = told->extent;
     hello->zone_capacity = (uint16_t)told->zone_capacity;
     hello->fingerprint[0] = (uint8_t)told->prefix, hello->fingerprint[1] = (uint8_t)(told->prefix >> 8);
     decoder->widths = contactfpga__widths(hello);
@@ -511,11 +520,7 @@ void cfpga_decode(const sheet *told, const uint8_t *data, size_t count, fields *
         if (length > CONTACTFPGA_PACKET_BYTES) length = 0;
         memcpy(decoder.packet, data, length);
         read_frame(&decoder, length, found);
-        for (uint16_t i = 0; i < found->items; i++, records += told->closed ? 4 : 3) {
-            int64_t record[4];
-            read_record(&decoder, i, record);
-            memcpy(records, record, (told->closed ? 4 : 3) * sizeof *record);
-        }
+        for (uint16_t i = 0; i < found->items; i++, records += columns_of(told)) read_record(&decoder, i, records);
         starts[1] = *starts + found->items;
     }
 }
@@ -527,7 +532,7 @@ void cfpga_sheet(port *p, const sheet *told) {
     bool held = held_back(p);
     p->known = told->known;
     if (held && p->descriptor >= 0) wake_thread();
-    p->columns = told->closed ? 4 : 3;
+    p->columns = columns_of(told);
     p->clean = false;
     /* What waits is decoded again where it is read as bytes: see native.py. */
     for (uint64_t i = p->tail.packets; i < p->head.packets; i++) p->packets[i % PACKETS].frame.valid = 0;
@@ -660,7 +665,7 @@ void cfpga_take(port *p, uint8_t *out, size_t room) {
     }
     for (uint64_t i = from.packets; i < to.packets; i++, out += 8) memcpy(out, &p->packets[i % PACKETS].size, 8);
     for (uint64_t i = from.records; i < to.records; i++, out += 8 * p->columns)
-        memcpy(out, p->records + 4 * (i % RECORDS), 8 * p->columns);
+        memcpy(out, p->records + MOST_COLUMNS * (i % RECORDS), 8 * p->columns);
     copy_bytes(p, from.bytes - told.partial, (size_t)(told.partial + told.bytes), out);
     if (held_back(p) && p->descriptor >= 0) wake_thread();
     p->tail = to;
@@ -696,7 +701,7 @@ static uint8_t *put_frame(const port *p, uint64_t index, uint8_t *out) {
 static uint8_t *put_records(const port *p, uint64_t index, uint8_t *out) {
     const packet *of = &p->packets[index % PACKETS];
     for (uint64_t i = of->records_end - (uint64_t)of->frame.items; i < of->records_end; i++, out += 8 * p->columns)
-        memcpy(out, p->records + 4 * (i % RECORDS), 8 * p->columns);
+        memcpy(out, p->records + MOST_COLUMNS * (i % RECORDS), 8 * p->columns);
     return out;
 }
 

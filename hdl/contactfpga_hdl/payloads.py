@@ -27,10 +27,15 @@ def zone_layout(derived: Derived) -> data.StructLayout:
     """A zone; with ``report = "moments"`` the bits of a zone record on the wire, lowest first.
 
     ``turned``, on a sheet whose ends meet, counts the cells past the seam: fewer than all, all in a ``ring``, or all
-    ones for a zone that is ``wound``.
+    ones for a zone that is ``wound``. With ``extent`` smallest and largest column and row follow.
     """
     moments = moments_layout(derived).members
-    return data.StructLayout(moments | ({"turned": derived.area_bits} if derived.skin.closed else {}))
+    turned = {"turned": derived.area_bits} if derived.skin.closed else {}
+    return data.StructLayout(moments | turned | extent_layout(derived))
+
+
+def extent_layout(derived: Derived) -> dict[str, int]:
+    return dict(zip(("left", "right", "top", "bottom"), derived.extent_bits))
 
 
 def record_layout(derived: Derived) -> data.StructLayout:

@@ -224,7 +224,7 @@ class Top(wiring.Component):
         wiring.connect(m, audit.items, backlog.passed)
         m.d.comb += [audit.taken.eq(rows.valid & rows.ready), audit.row.eq(rows.payload)]
         record = label.records.payload
-        self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+        self._probe(m, "record", label.records, data=Mux(record.end, 0, record.zone.as_value()), end=record.end)
         items = self._divided(m, backlog) if self.skin.report == "barycenter" else backlog.waiting
         return items, audit.summary
 

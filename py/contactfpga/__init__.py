@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from contactfpga.wire.faults import Faults, SelfTestSlot
     from contactfpga.wire.hello import Hello
     from contactfpga.zones.batch import Batch
+    from contactfpga.zones.box import Box, BoxMm
     from contactfpga.zones.units import UnitHistory, UnitSamples
     from contactfpga.zones.zone import Zone, Zones
 
@@ -66,6 +67,8 @@ __all__ = [
     "Board",
     "BoardClosed",
     "BoardSilent",
+    "Box",
+    "BoxMm",
     "ContactFPGAError",
     "Event",
     "Events",
@@ -128,6 +131,7 @@ _NAMES = {
     "wire.faults": "Faults SelfTestSlot",
     "wire.hello": "Hello",
     "zones.batch": "Batch",
+    "zones.box": "Box BoxMm",
     "zones.units": "UnitHistory UnitSamples",
     "zones.zone": "Zone Zones",
 }

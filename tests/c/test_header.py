@@ -9,9 +9,10 @@ import subprocess
 from pathlib import Path
 
 import c_vectors
+import numpy as np
 import pytest
 from c_compilers import COMPILERS, FOLDER, answers, program
-from frames import moments
+from frames import moments, reaching
 from model_board import ModelBoard
 from sample import sample
 from wire import FINGERPRINT, SHEET, digits, last_byte, old_frame, old_hello
@@ -40,6 +41,9 @@ SKINS = [
     Skin(rows=6, columns=7, connectivity=4, surface="cylinder", radius_mm=9.0, closed=True),
     Skin(rows=6, columns=5, guard=True, self_test=True, scan="reversal", precharge_us=0.25),
     Skin(rows=5, columns=4, units=3),
+    Skin(rows=6, columns=7, extent=True),
+    Skin(rows=5, columns=8, extent=True, report="barycenter", barycenter_bits=2, connectivity=4),
+    Skin(rows=7, columns=5, extent=True, surface="cylinder", radius_mm=9.0, closed=True),
 ]
 
 
@@ -105,7 +109,8 @@ def hello_line(hello: Hello) -> str:
     sheet = hello.sheet
     report = ["moments", "cells", "barycenter"].index(sheet.report)
     return (
-        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed} {report} {sheet.barycenter_bits} "
+        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed}{'e' * sheet.extent} {report} "
+        f"{sheet.barycenter_bits} "
         f"{int(hello.send == 'on_change')} {sheet.zone_capacity} {int(sheet.ghosts)} "
         f"{int(hello.guard)} {int(hello.self_test)} "
         f"{sheet.pitch_x_mm:.17g} {sheet.pitch_y_mm:.17g} {sheet.radius_mm or 0:.17g} {hello.fingerprint.hex()} "
@@ -131,6 +136,7 @@ def frame_line(zones: Zones) -> str:
     frame = zones.frame
     flags = sum(1 << bit for bit, name in enumerate(FLAGS) if name in frame.flags)
     items = frame.moments if frame.barycenters is None else frame.barycenters
+    items = items if frame.extents is None else np.concatenate([items, frame.extents], axis=1)
     words = [",".join(map(str, row)) for row in items.tolist()]
     if frame.bitmap is not None:
         words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
@@ -139,7 +145,9 @@ def frame_line(zones: Zones) -> str:
 
 
 def zones(rng, skin) -> list:
-    """Of zones that could be on the sheet."""
+    """Of zones that could be on the sheet; some of those with an extent could not."""
+    if skin.extent:
+        return reaching(rng, skin)
     count = rng.choice([0, 1, 1, 2, min(skin.zone_capacity, 7)])
     if skin.report == "barycenter":
         most = skin.barycenter_bits

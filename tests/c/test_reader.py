@@ -1,12 +1,14 @@
 """The thread in C that reads ports: under sanitizers, and packet by packet against the decoder in Python."""
 
 import itertools
+import random
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from c_compilers import FOLDER, WARNINGS
+from frames import reaching
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_board import ModelBoard
@@ -62,6 +64,9 @@ SKINS = [
     Skin(report="barycenter", barycenter_bits=4),
     Skin(rows=7, columns=13, connectivity=4, zone_capacity=3),
     Skin(rows=6, columns=7, connectivity=4, surface="cylinder", radius_mm=9.0, closed=True),
+    Skin(rows=6, columns=7, extent=True),
+    Skin(rows=6, columns=7, extent=True, report="barycenter"),
+    Skin(rows=6, columns=7, extent=True, surface="cylinder", radius_mm=9.0, closed=True),
 ]
 
 
@@ -93,7 +98,7 @@ def fields(frame):
         frame.zones,
         frame.cells,
     )
-    return *plain, records.tolist()
+    return *plain, records.tolist(), None if frame.extents is None else frame.extents.tolist()
 
 
 @st.composite
@@ -103,7 +108,9 @@ def streams(draw):
     board, data = ModelBoard(skin), b""
     sizes = st.lists(st.tuples(*[st.integers(1, 12)] * 3), max_size=4)
     for _ in range(draw(st.integers(1, 12))):
-        if skin.report != "barycenter" and not skin.sheet.closed:
+        if skin.extent:
+            board.moments = reaching(random.Random(draw(st.integers(0, 1 << 32))), skin)
+        elif skin.report != "barycenter" and not skin.sheet.closed:
             board.moments = [
                 (area, min(x * area, (skin.columns - 1) * area), min(y * area, (skin.rows - 1) * area))
                 for area, x, y in draw(sizes)

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def benches():
-    """Compiled labellers: ``benches(rows, columns, connectivity, labeller, closed)``."""
+    """Compiled labellers: ``benches(rows, columns, connectivity, labeller, closed, extent)``."""
     from zone_oracles import skin_of
 
     from contactfpga_sim.verify.cosim.bench_labeller import LabelBench

@@ -116,6 +116,17 @@ def check_items(wanted, taker):
     assert [word for word, item in zip(got, wanted) if item] == [item[0] for item in wanted if item]
 
 
+def test_extents_go_with_their_zones(bench, rng):
+    oracle, dut = Oracle(4, 4, 2), Divider(skin_of(4, 4, 2, extent=True))
+    zones = [(zone, rng.randrange(256)) for zone in rng.sample(oracle.every_zone(), 60)]
+    bits = oracle.end.bit_length() - 1
+    sim = bench(dut)
+    sim.source(dut.records, [oracle.record(*zone) | extent << bits for zone, extent in zones], rng, gap=0.3)
+    taker = sim.sink(dut.items, rng, stall=0.5)
+    sim.run(6000, until=lambda: len(taker.transfers) == len(zones))
+    assert [word for _, word in taker.transfers] == [oracle.item(*zone)[0] | extent << 12 for zone, extent in zones]
+
+
 SHEETS = [(1, 1), (1, 2), (2, 2), (3, 3), (1, 7), (6, 1), (2, 5), (4, 3), (4, 4)]
 BITS = (0, 1, 4, 8)
 

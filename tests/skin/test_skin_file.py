@@ -87,6 +87,7 @@ OTHER = {
     "debounce_release_us": 4000.0,
     "labeller": "serial",
     "report": "cells",
+    "extent": True,
     "send": "on_change",
     "keep_alive_ms": 50.0,
     "zone_capacity": 63,

@@ -25,6 +25,8 @@ SKINS = {
     "pressure units": Skin(rows=5, columns=4, units=3),
     "overflow": Skin(rows=8, columns=8, zone_capacity=2, connectivity=4),
     "around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True),
+    "extents": Skin(rows=5, columns=9, extent=True),
+    "extents around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=9.0, closed=True, extent=True),
 }
 
 
@@ -59,7 +61,7 @@ def _stream(skin: Skin, seed: int) -> str:
     report = ["moments", "cells", "barycenter"].index(skin.report)
     bits = skin.barycenter_bits if known.divided else 0
     lines.append(
-        f"hello {skin.rows}x{skin.columns} {skin.connectivity}{'c' * skin.closed} {report} {bits} "
+        f"hello {skin.rows}x{skin.columns} {skin.connectivity}{'c' * skin.closed}{'e' * skin.extent} {report} {bits} "
         f"{int(skin.send == 'on_change')} "
         f"{skin.zone_capacity} {int(skin.diodes == 'none')} {int(skin.guard)} "
         f"{int(skin.self_test)} {skin.pitch_x_mm:.17g} {skin.pitch_y_mm:.17g} "
@@ -102,6 +104,8 @@ def _frame(wire: Wire, rng, index: int, sent: int, heard: int):
 
 def _zone(skin: Skin, rng, whole: bool, divided: bool) -> tuple[int, ...]:
     columns, rows = skin.columns, skin.rows
+    if skin.extent:
+        return _reaching(skin, rng, whole)
     area = rows * columns if whole else int(rng.integers(1, max(2, min(9, rows * columns // 4))))
     x, y = (rng.integers(0, columns, area), rng.integers(0, rows, area)) if not whole else np.indices((columns, rows))
     sums = int(x.sum()), int(y.sum())
@@ -110,6 +114,21 @@ def _zone(skin: Skin, rng, whole: bool, divided: bool) -> tuple[int, ...]:
     if not divided:
         return area, *sums
     return area, *((2 * total * 2**skin.barycenter_bits + area) // (2 * area) for total in sums)
+
+
+def _reaching(skin: Skin, rng, whole: bool) -> tuple[int, ...]:
+    """All cells, or a run of a row, on a closed sheet sometimes over the seam."""
+    y = int(rng.integers(skin.rows))
+    length, first = int(rng.integers(1, skin.columns)), int(rng.integers(skin.columns))
+    top, bottom = (0, skin.rows - 1) if whole else (y, y)
+    left, right = (0, skin.columns - 1) if whole else (first, first + length - 1)
+    if not skin.closed:
+        right = min(right, skin.columns - 1)
+    lines, places = bottom - top + 1, range(left, right + 1)
+    area, past = lines * len(places), lines * sum(x >= skin.columns for x in places)
+    sums = lines * sum(x % skin.columns for x in places), len(places) * sum(range(top, bottom + 1))
+    turned = [area if whole else past] if skin.closed else []
+    return area, *sums, *turned, left, right % skin.columns, top, bottom
 
 
 def _packet(data: bytes) -> str:

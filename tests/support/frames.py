@@ -1,10 +1,13 @@
 """Random frames as a board would send them, and what the product reads in bytes: streams, and packets one by one."""
 
+import numpy as np
 from wire import Wire
+from zone_oracles import nearest
 
 from contactfpga.skin.derived import Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.hello import KIND_HELLO
+from contactfpga_sim.model.golden.label import labelling
 
 
 def moments(rng, skin, zones):
@@ -15,6 +18,22 @@ def moments(rng, skin, zones):
         row = area, rng.randrange(area * (skin.columns - 1) + 1), rng.randrange(area * (skin.rows - 1) + 1)
         rows.append(row + ((past(rng, skin, area),) if skin.closed else ()))
     return rows
+
+
+def reaching(rng, skin):
+    """Records with extents, of zones of random cells; now and then a field is one more or less."""
+    cells = np.random.default_rng(rng.getrandbits(32)).random((skin.rows, skin.columns)) < rng.choice([0.1, 0.4, 0.7])
+    found = []
+    for zone in labelling(cells, skin.connectivity, skin.labeller, skin.closed).departures:
+        x, y = zone.sum_x, zone.sum_y
+        if skin.report == "barycenter":
+            x, y = (nearest(total, zone.area, skin.barycenter_bits) for total in (x, y))
+        record = [zone.area, x, y, *([zone.turned] if skin.closed else []), *zone.extent]
+        if rng.random() < 0.05:
+            place = rng.randrange(1, len(record))
+            record[place] = max(0, record[place] + rng.choice([-1, 1])) % (1 << skin.derived.record_bits[place])
+        found.append(tuple(record))
+    return found
 
 
 def past(rng, skin, area):

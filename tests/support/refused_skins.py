@@ -162,6 +162,13 @@ REFUSED = [
         {"debounce": "asym_eager_defer_pk", "debounce_release_us": 393_121},
         "debounce_release_us is 393121.0; it must lie between 0.0 and 393120.0 us",
     ),
+    # extents
+    ({"extent": 1}, "extent is 1; it must be true or false"),
+    ({"extent": True, "report": "cells"}, "report is 'cells'; extent = true needs report = 'moments' or 'barycenter'"),
+    *(
+        ({"extent": True, "labeller": name}, f"labeller is '{name}'; extent = true needs labeller = 'run' or 'serial'")
+        for name in ("projection", "single")
+    ),
     # precharge and line reversal
     (
         {"precharge_us": 0.25, "column_read": "74hc165"},

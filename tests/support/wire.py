@@ -81,14 +81,18 @@ class Wire:
         counted = 24 + 8 + 3 + self.known.area_bits + self.known.zones_bits
         self.overwritten_bits = -(-(counted + 4) // 8) * 8 - counted
 
-    def record(self, area, sum_x, sum_y, turned=0) -> bytes:
-        """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell."""
+    def record(self, area, sum_x, sum_y, *more) -> bytes:
+        """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell.
+
+        more: the cells past the seam of a closed sheet, then an extent if the Skin has it; nothing stands for zeros.
+        """
         known = self.known
+        widths = [known.area_bits] * self.skin.closed + [*known.extent_bits]
+        rest = zip(more or [0] * len(widths), widths, strict=True)
         if known.divided:
             area_bits, x_bits, y_bits = known.barycenter_bits
-            return fields((area % (1 << area_bits), area_bits), (sum_x, x_bits), (sum_y, y_bits))
-        past = [(turned, known.area_bits)] if self.skin.closed else []
-        return fields((area, known.area_bits), (sum_x, known.sum_x_bits), (sum_y, known.sum_y_bits), *past)
+            return fields((area % (1 << area_bits), area_bits), (sum_x, x_bits), (sum_y, y_bits), *rest)
+        return fields((area, known.area_bits), (sum_x, known.sum_x_bits), (sum_y, known.sum_y_bits), *rest)
 
     def trailer(self, *, time=0, sequence=0, overwritten=0, heard=1, cells=0, zones=0) -> bytes:
         return fields(
@@ -145,7 +149,8 @@ class Wire:
         skin = self.skin
         report = ["moments", "cells", "barycenter"].index(skin.report)
         bits = skin.barycenter_bits if skin.report == "barycenter" else 0
-        sizes = (skin.rows, skin.columns, skin.connectivity + 128 * skin.closed, report, bits, skin.send == "on_change")
+        joins = skin.connectivity + 128 * skin.closed + 64 * skin.extent
+        sizes = (skin.rows, skin.columns, joins, report, bits, skin.send == "on_change")
         facts = {
             SHEET: struct.pack("<BBBBBBHBB", *sizes, skin.zone_capacity, skin.diodes == "none", skin.guard),
             PITCH: struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm),

@@ -53,9 +53,9 @@ def nearest(total, area, bits):
     return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
 
 
-def skin_of(rows, columns, connectivity, labeller, closed=False):
+def skin_of(rows, columns, connectivity, labeller, closed=False, extent=False):
     around = {"surface": "cylinder", "radius_mm": 20.0, "closed": True} if closed else {}
-    rule = {"connectivity": connectivity, "labeller": labeller}
+    rule = {"connectivity": connectivity, "labeller": labeller, "extent": extent}
     return Skin(rows=rows, columns=columns, settle_us=100, zone_capacity=1, **rule, **around)
 
 

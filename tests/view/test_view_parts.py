@@ -19,7 +19,9 @@ from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.sources import CHART_S, Meter
 from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.wire.protocol import Frame
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zones
 
 TILES = {
     "plane": Tiles(Skin().sheet),
@@ -172,6 +174,18 @@ def test_a_circle_has_its_zones_area_and_lies_around_its_barycenter(name):
     else:
         assert np.allclose(np.hypot(rim[:, 0], rim[:, 1]), 40 + lift)
     assert len(found.circles) == picture.SIDES
+
+
+def test_a_box_is_drawn_along_the_outer_edges_of_its_cells():
+    skin = Skin(extent=True)
+    records, extents = np.array([[4, 6, 9]]), np.array([[1, 2, 2, 3]])
+    one = Zones(Frame(0, 0, frozenset(), 0, 0, 1, 4, records, None, extents=extents), skin.sheet)
+    lines = picture.boxes(one, TILES["plane"].surface, 0.0)
+    corners = {(10 * x + 5, 10 * y + 5) for x in (0, 2) for y in (1, 3)}
+    assert corners <= set(map(tuple, np.round(lines[:, 0, :2] * 1000, 6).tolist()))
+    assert np.array_equal(lines[1:, 0], lines[:-1, 1])
+    assert np.allclose(lines[0, 0], lines[-1, 1])
+    assert not len(picture.boxes(frame(0, [(4, 6, 9)]), TILES["plane"].surface, 0.0))
 
 
 def test_cells_are_colored_by_what_is_known_of_them():

@@ -187,7 +187,7 @@ def test_no_packet_is_longer_than_the_reader_expects():
             around = {"surface": "cylinder", "radius_mm": 99.0, "closed": True} if report != "barycenter" else {}
             for surface in ({}, around):
                 shape = {"rows": rows, "columns": columns, "connectivity": 4, "settle_us": 10_000.0}
-                skin = Skin(**shape, report=report, **surface)
+                skin = Skin(**shape, report=report, extent=report != "cells", **surface)
                 capacity = skin.max_zones() if report != "cells" else None
                 longest = max(longest, Widths(skin.replace(zone_capacity=capacity).sheet).max_frame_bytes)
     assert longest == LONGEST_PACKET

@@ -16,15 +16,21 @@ SHEETS = {
     "rounded": PLANE.replace(report="barycenter"),
     "closed": contactfpga.Skin(rows=12, columns=20, surface="cylinder", radius_mm=40.0, closed=True, settle_us=20.0),
 }
+SHEETS |= {f"{name} with extents": skin.replace(extent=True) for name, skin in SHEETS.items()}
 MOMENTS = {
     "plane": [(4, 34, 6), (1, 5, 3)],
     "rounded": [(4, 17 << 3, 6), (1, 40, 24)],
     "closed": [(4, 34, 6, 0), (20, 190, 60, 20)],
+    "plane with extents": [(4, 34, 6, 8, 9, 1, 2), (1, 5, 3, 5, 5, 3, 3)],
+    "rounded with extents": [(4, 17 << 3, 24, 8, 9, 1, 2), (1, 5 << 4, 3 << 4, 5, 5, 3, 3)],
+    "closed with extents": [(4, 38, 6, 2, 19, 0, 1, 2), (20, 190, 60, 20, 0, 19, 3, 3)],
 }
 
 VECTORS = {
     "point_mm": ["point_x_mm", "point_y_mm", "point_z_mm"],
     "normal": ["normal_x", "normal_y", "normal_z"],
+    "box": ["left", "right", "top", "bottom"],
+    "box_mm": ["box_x_mm", "box_y_mm", "box_width_mm", "box_height_mm"],
 }
 
 

@@ -63,6 +63,7 @@ class Unwrap(Elaboratable):
     turn, cells (in): turn of the walked cluster, and number of its new cells.
     ring (in): the group becomes a ring.
     group (out): the resulting group.
+    above (out), with ``extent``: whether all cells of ``kept``, of ``found``, and the new cells are on the upper turn.
     """
 
     def __init__(self, derived: Derived):
@@ -72,6 +73,8 @@ class Unwrap(Elaboratable):
         )
         self.cells = Signal(derived.area_bits, name="turned_cells")
         self.group = Signal(data.StructLayout(turned_layout(derived)), name="turned_group")
+        self.above = Signal(3, name="turned_above")
+        self._extent = derived.skin.extent
 
     def elaborate(self, platform):
         m = Module()
@@ -94,6 +97,8 @@ class Unwrap(Elaboratable):
             group.wound.eq(kept.wound | found.wound | too_far | kept_above & kept.two | found_above & found.two),
             group.ring.eq(kept.ring | found.ring | self.ring),
         ]
+        if self._extent:
+            m.d.comb += self.above.eq(Cat(kept_above, found_above, cells_above))
         return m
 
 
@@ -103,8 +108,9 @@ def stored_turns() -> dict[str, int]:
 
 def unwrapped(
     m: Module, derived: Derived, join: data.View, kept: data.View, found: Value, group: data.View, stored: data.View
-) -> None:
-    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``, and to its word in the table."""
+) -> Value:
+    """Add turns to a ``group`` of the labeller ``run``, from ``kept`` and ``found``, and to its word in the table.
+    Returns ``Unwrap.above``."""
     m.submodules.unwrap = unwrap = Unwrap(derived)
     m.d.comb += [
         unwrap.kept.eq(kept),
@@ -118,6 +124,7 @@ def unwrapped(
     # A zone in the table is on the turn of its first run, a waiting group on that of its first cluster.
     with m.If(join.first_turn & ~join.place[-1]):
         m.d.comb += stored.back.eq(0)
+    return unwrap.above
 
 
 class Acts(Protocol):
@@ -176,7 +183,7 @@ class SerialTurns:
         onto = has_run & self.turn & ~self.last_turn
         return Mux(starts, onto, (self.first_turn | self.turns.down) & ~found.last_turn)
 
-    def unwrap(self, m: Module, kept: data.View, found: data.View, joins: Value, zone: Value, adds: Value) -> data.View:
+    def unwrap(self, m: Module, kept: data.View, found: data.View, joins: Value, zone: Value, adds: Value) -> Unwrap:
         m.submodules.unwrap = unwrap = Unwrap(self.derived)
         m.d.comb += [
             unwrap.kept.eq(kept),
@@ -188,4 +195,4 @@ class SerialTurns:
             unwrap.down.eq(self.turns.down),
             unwrap.ring.eq(self.turns.ring),
         ]
-        return unwrap.group
+        return unwrap

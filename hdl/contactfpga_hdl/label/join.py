@@ -8,6 +8,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.label.extent import extent_of_run
 from contactfpga_hdl.label.steps import join_layout, nesting, place_bits, place_of, step_layout, waiting
 from contactfpga_hdl.util.stack import Stack
 
@@ -278,11 +279,15 @@ class Join(wiring.Component):
         return decided
 
     def _run_moments(self, m: Module, run: data.View) -> list:
-        """Moments of the new run; its column sum is a difference of triangular numbers."""
+        """Moments of the new run, whose column sum is a difference of triangular numbers, and its extent."""
         step = self.step
+        extent = {}
+        if self.derived.skin.extent:
+            extent = extent_of_run(self.derived, step.start, step.past - 1, step.y)
         below = Array(math.comb(column, 2) for column in range(self.derived.skin.columns + 1))
         return [
             run.area.eq(step.area),
             run.sum_x.eq(below[step.past] - below[step.start]),
             run.sum_y.eq(step.area * step.y),
+            *(run[name].eq(field) for name, field in extent.items()),
         ]

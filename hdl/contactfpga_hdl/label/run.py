@@ -8,12 +8,13 @@ A zone's moments are in a table at the start column of its first run in the row 
 different zones in the same or adjacent rows never share a place, so the table cannot overflow.
 """
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Const, Module, Mux, Signal
 from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.label.extent import larger, lifted
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.steps import Walk, join_layout, kept_layout, place_bits, zone_of
 from contactfpga_hdl.payloads import labeller_ports, record_layout
@@ -92,10 +93,15 @@ class Sum(wiring.Component):
             # Only the first run of its zone loads, and only the later ones can find it on the stack.
             m.d.comb += group[name].eq((kept[name] + join.run[name]) + found[name])
         m.d.comb += stored.eq(group)
+        above = Const(0, 3)
         if self.derived.skin.closed:
             from contactfpga_hdl.label.around import unwrapped
 
-            unwrapped(m, self.derived, join, kept, found, group, stored)
+            above = unwrapped(m, self.derived, join, kept, found, group, stored)
+        if self.derived.skin.extent:
+            parts = zip((kept, join.run, found), (above[0], above[2], above[1]))
+            extent = larger(lifted(self.derived, part, up) for part, up in parts)
+            m.d.comb += [group[name].eq(field) for name, field in extent.items()]
         with m.If(works):
             m.d.sync += [kept.eq(group), before.eq(group)]
             with m.If(join.closes):

@@ -5,12 +5,13 @@ walked cluster's group. At the start of a run of the row before, a second clock 
 or from a waiting group. Waiting groups are in the table, too, each linked to the group that began to wait before.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.around import SerialTurns, stored_turns
+from contactfpga_hdl.label.extent import extent_of_run, larger, lifted
 from contactfpga_hdl.label.steps import kept_layout, nesting, place_of, zone_of
 from contactfpga_hdl.payloads import labeller_ports
 
@@ -114,8 +115,9 @@ class SerialLabeller(wiring.Component):
         found = self._read_group(m, walk, acts, group, groups, earlier)
         if nesting(self.derived):
             self._nest(m, acts, group, earlier, later, found.below, around)
+        above = Const(0, 3)
         if around is not None:
-            self._go_around(m, acts, walk, group, found, earlier, around)
+            above = self._go_around(m, acts, walk, group, found, earlier, around)
         # Runs of the group, and their brackets
         self._know_runs(m, walk, acts, group, found)
         write = self._write_brackets(m, walk, acts, group, found, earlier_runs, later_runs)
@@ -127,7 +129,7 @@ class SerialLabeller(wiring.Component):
                 write_linked.data.eq(around.link(group.has_run, acts.starts, found)),
             ]
         # Moments
-        self._sum(m, walk, acts, group, found)
+        self._sum(m, walk, acts, group, found, above)
         self._store_group(m, acts, group, groups, around)
         self._let_out(m, walk, acts, group)
         return m
@@ -269,13 +271,14 @@ class SerialLabeller(wiring.Component):
         found: data.View,
         earlier: Value,
         around: SerialTurns,
-    ) -> None:
+    ) -> Value:
         over = acts.closes | ~walk.active
         joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
-        unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)
+        unwrap = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)
         with m.If(acts.enable):
             around.keep(m, acts.starts, group.has_run, found, over)
-            m.d.sync += [group.moments[name].eq(unwrapped[name]) for name in unwrapped.shape().members]
+            m.d.sync += [group.moments[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
+        return unwrap.above
 
     def _read_group(
         self, m: Module, walk: _Columns, acts: _Step, group: _Group, groups: memory.Memory, earlier: Value
@@ -304,11 +307,20 @@ class SerialLabeller(wiring.Component):
             with m.If(acts.closes | ~walk.active):
                 m.d.sync += group.has_run.eq(0)
 
-    def _sum(self, m: Module, walk: _Columns, acts: _Step, group: _Group, found: data.View) -> None:
+    def _sum(self, m: Module, walk: _Columns, acts: _Step, group: _Group, found: data.View, above: Value) -> None:
+        """Add the cell, or what is ``found``, never both."""
         with m.If(acts.enable):
             for name, share in (("area", 1), ("sum_x", walk.column), ("sum_y", walk.y)):
                 more = found.moments[name] | Mux(acts.adds, share, 0)
                 m.d.sync += group.moments[name].eq(group.moments[name] + more)
+            if self.derived.skin.extent:
+                fields = extent_of_run(self.derived, walk.column, walk.column, walk.y)
+                cell = {name: Mux(acts.adds, field, 0) for name, field in fields.items()}
+                kept, joins, adds = (
+                    lifted(self.derived, *part) for part in zip((group.moments, found.moments, cell), above)
+                )
+                extent = larger((kept, {name: joins[name] | adds[name] for name in kept}))
+                m.d.sync += [group.moments[name].eq(field) for name, field in extent.items()]
         with m.If(acts.enable & (acts.closes | ~walk.active)):  # at power-up what the memory reads is not known
             m.d.sync += group.moments.eq(0)
 

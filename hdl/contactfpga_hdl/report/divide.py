@@ -15,13 +15,13 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.payloads import item_layout, record_layout
+from contactfpga_hdl.payloads import extent_layout, item_layout, record_layout
 
 
 def barycenter_layout(derived: Derived) -> data.StructLayout:
-    """Area, without the bits that all areas of the sheet share, and barycenter: a record on the wire with ``report =
-    "barycenter"``."""
-    return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
+    """Area, without the bits that all areas of the sheet share, barycenter and extent: a record on the wire with
+    ``report = "barycenter"``."""
+    return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits)) | extent_layout(derived))
 
 
 class Divider(wiring.Component):
@@ -54,6 +54,7 @@ class Divider(wiring.Component):
         left = Signal(range(bits + 1))  # bits to come, 0 while no zone is divided
         waits = Signal()  # an item does, that of these
         area = Signal(barycenter_layout(self.derived)["area"].shape)
+        extent = {name: Signal(width, name=f"waiting_{name}") for name, width in extent_layout(self.derived).items()}
         waiting = Signal(quotients)
         begins = self.records.valid & ~end & (left == 0)
         free = ~waits | self.items.ready
@@ -70,13 +71,13 @@ class Divider(wiring.Component):
         with m.If(free):
             m.d.sync += waits.eq(last)
         with m.If(last & free):
-            m.d.sync += [area.eq(zone.area), waiting.eq(found)]
+            m.d.sync += [area.eq(zone.area), waiting.eq(found), *(extent[name].eq(zone[name]) for name in extent)]
         # Streams
         m.d.comb += [
             self.records.ready.eq(Mux(end, ~waits & self.items.ready, last & free)),
             self.items.valid.eq(waits | self.records.valid & end),
             self.items.payload.end.eq(~waits),
-            self.items.payload.data.eq(Cat(area, self._rounded(m, waiting))),
+            self.items.payload.data.eq(Cat(area, self._rounded(m, waiting), *extent.values())),
         ]
         return m
 

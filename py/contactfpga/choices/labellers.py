@@ -27,6 +27,8 @@ class Labeller(Choice):
     """The most clocks from an empty row below an empty row until the labeller takes the next."""
     closed: bool = False
     """Whether zones are joined over the seam of a sheet whose ends meet."""
+    extent: bool = False
+    """Whether zones have their smallest and largest row and column."""
 
 
 LabellerName = Literal["run", "serial", "projection", "single"]
@@ -43,6 +45,7 @@ LABELLERS: dict[str, Labeller] = {
             end_clocks=lambda derived: derived.open_zones + derived.skin.closed + 4,
             row_clocks=lambda derived: derived.open_zones + derived.skin.closed + 2,
             closed=True,
+            extent=True,
         ),
         Labeller(
             name="serial",
@@ -53,6 +56,7 @@ LABELLERS: dict[str, Labeller] = {
             end_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
             row_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
             closed=True,
+            extent=True,
             empty_row_clocks=lambda derived: derived.skin.columns + 2,
         ),
         Labeller(

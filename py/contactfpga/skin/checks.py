@@ -207,6 +207,8 @@ def check_link(skin: Skin) -> None:
     _within(skin, "barycenter_bits")
     if skin.report != "barycenter":
         _left_out(skin, "barycenter_bits", "set report = 'barycenter'")
+    if skin.extent:
+        _check_extent(skin)
     low, high, _ = skin.limits("clock_hz")
     if skin.clock_hz % 1_000_000 or not low <= skin.clock_hz <= high:
         ends = f"{low // 1_000_000} to {high // 1_000_000} MHz"
@@ -222,6 +224,17 @@ def check_link(skin: Skin) -> None:
         )
     if skin.send == "on_change":
         _within(skin, "keep_alive_ms")
+
+
+def _check_extent(skin: Skin) -> None:
+    if skin.report == "cells":
+        raise SkinError("report is 'cells'; extent = true needs report = 'moments' or 'barycenter'")
+    if not labellers.find(skin.labeller).extent:
+        raise SkinError(f"labeller is {str(skin.labeller)!r}; extent = true needs labeller = {_labellers('extent')}")
+
+
+def _labellers(able: str) -> str:
+    return " or ".join(repr(name) for name, labeller in labellers.LABELLERS.items() if getattr(labeller, able))
 
 
 def check_timing(skin: Skin) -> None:
@@ -310,8 +323,7 @@ def _check_closed(skin: Skin, around_mm: float) -> dict[str, float]:
     if skin.report == "barycenter":
         raise SkinError("report is 'barycenter'; closed = true needs report = 'moments' or 'cells'")
     if skin.report == "moments" and not labellers.find(skin.labeller).closed:
-        able = " or ".join(repr(name) for name, labeller in labellers.LABELLERS.items() if labeller.closed)
-        raise SkinError(f"labeller is {str(skin.labeller)!r}; closed = true needs labeller = {able}")
+        raise SkinError(f"labeller is {str(skin.labeller)!r}; closed = true needs labeller = {_labellers('closed')}")
     pitch_mm = around_mm / skin.columns
     given = skin.pitch_x_mm != type(skin).pitch_x_mm
     if given and abs(skin.pitch_x_mm / pitch_mm - 1) > _PITCH_TOLERANCE:

@@ -84,21 +84,27 @@ class Widths:
         return self.sheet.max_zones().bit_length()
 
     @functools.cached_property
+    def extent_bits(self) -> tuple[int, ...]:
+        """Bits of a zone's smallest and largest column, then row; () without ``extent``."""
+        lines = (self.sheet.columns, self.sheet.columns, self.sheet.rows, self.sheet.rows) if self.sheet.extent else ()
+        return tuple(max(1, (count - 1).bit_length()) for count in lines)
+
+    @functools.cached_property
     def record_bits(self) -> tuple[int, ...]:
         """Bits of a zone's fields on the wire: area, and sums or barycenter; on a sheet whose ends meet, also cells
-        past the seam.
+        past the seam; :attr:`extent_bits`.
 
         Divided areas are never 0, so an area of all cells is sent as 0; if the cells are a power of two, this saves a
         bit.
         """
         if not self.report.divided:
             past = (self.area_bits,) if self.sheet.closed else ()
-            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *past
+            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *past, *self.extent_bits
         x_bits, y_bits = (
             max(1, (lines - 1 << self.sheet.barycenter_bits).bit_length())
             for lines in (self.sheet.columns, self.sheet.rows)
         )
-        return max(1, (self.cells - 1).bit_length()), x_bits, y_bits
+        return max(1, (self.cells - 1).bit_length()), x_bits, y_bits, *self.extent_bits
 
     @functools.cached_property
     def record_bytes(self) -> int:
@@ -156,6 +162,7 @@ LONGEST_PACKET = Widths(
         radius_mm=1.0,
         closed=True,
         ghosts=False,
+        extent=True,
     )
 ).max_frame_bytes
 """Upper bound on the wire bytes of a frame of any Skin."""

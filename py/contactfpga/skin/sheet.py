@@ -33,6 +33,8 @@ class Sheet:
     """Whether the last column is a neighbor of the first."""
     ghosts: bool
     """Whether the sheet lacks diodes, so that pressed switches can make others read pressed."""
+    extent: bool = False
+    """Whether zones come with their smallest and largest row and column."""
 
     @property
     def around_mm(self) -> float | None:
@@ -61,6 +63,8 @@ class Sheet:
                 raise ValueError(f"{name} is {getattr(self, name)}")
         if self.closed and (self.columns < MIN_AROUND or self.radius_mm is None or self.report == "barycenter"):
             raise ValueError(f"{self.columns} columns around, radius {self.radius_mm}, report {self.report!r}")
+        if self.extent and self.report == "cells":
+            raise ValueError("report 'cells' has no extents")
         if self.connectivity not in (4, 8):
             raise ValueError(f"connectivity is {self.connectivity}")
         if not 1 <= self.zone_capacity <= self.max_zones():

@@ -116,6 +116,9 @@ class Skin:
     """
     barycenter_bits: int = field(default=4, metadata={"limits": (0, MAX_BARYCENTER_BITS, "")})
     """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
+    extent: bool = False
+    """Whether each zone comes with its smallest and largest row and column, :attr:`Zone.box`; with the labellers
+    ``run`` and ``serial``, and not with ``report = "cells"``."""
     send: Literal["always", "on_change"] = "always"
     """``always``: every frame is sent. ``on_change``: only keep-alives, and frames whose cells or flag
     ``fault`` differ from the last one.

@@ -142,6 +142,9 @@ class Frame:
     barycenters: np.ndarray | None = None
     """(n, 3) int64 area, x, y of each zone with ``report = "barycenter"``, x and y in cells / 2^``barycenter_bits``;
     otherwise None."""
+    extents: np.ndarray | None = None
+    """(n, 4) int64 smallest and largest column, smallest and largest row of each zone, as :class:`contactfpga.Box`;
+    None for a sheet without."""
 
 
 def decode(plain: bytes, widths: Widths) -> tuple[tuple[int, ...], list[list[int]]]:
@@ -182,9 +185,14 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
 
 
 def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Frame:
-    """A frame from a row of :data:`contactfpga.wire.table.FIELDS` and its (n, 3), (n, 4) or (rows, columns) records."""
+    """A frame from a row of :data:`contactfpga.wire.table.FIELDS` and its records as in
+    :attr:`contactfpga.wire.table.PacketTable.records`."""
     _, time_us, sequence, heard, cells, zones, overwritten, flags, _ = fields
     divided, bitmap = sheet.report == "barycenter", sheet.report == "cells"
+    extents = None
+    if sheet.extent:
+        records = records.reshape(-1, len(EXTENT) + sums_of(sheet))
+        records, extents = records[:, : -len(EXTENT)], records[:, -len(EXTENT) :]
     frame = object.__new__(Frame)  # whose own way to begin takes most of the time of this
     vars(frame).update(
         sequence=sequence,
@@ -197,6 +205,7 @@ def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Fram
         moments=no_records(sheet) if divided or bitmap or not len(records) else records,
         bitmap=records.astype(bool) if bitmap else None,
         barycenters=(records if len(records) else NO_RECORDS) if divided else None,
+        extents=extents,
     )
     return frame
 
@@ -205,6 +214,15 @@ NO_RECORDS = np.zeros((0, 3), np.int64)
 NO_RECORDS.flags.writeable = False
 _NO_CLOSED_RECORDS = np.zeros((0, 4), np.int64)
 _NO_CLOSED_RECORDS.flags.writeable = False
+
+
+EXTENT = ("left", "right", "top", "bottom")
+"""Fields at the end of a zone's record on a sheet with extents."""
+
+
+def sums_of(sheet: Sheet) -> int:
+    """Number of a zone's fields before those of its extent."""
+    return 3 + sheet.closed
 
 
 def no_records(sheet: Sheet) -> np.ndarray:
@@ -229,10 +247,32 @@ def _check_sums(records: list[list[int]], cells: int, flags: int, widths: Widths
 
 def _is_inside(record: list[int], widths: Widths) -> bool:
     sheet = widths.sheet
-    area, x, y, *past = record
+    area, x, y = record[:3]
+    turned = record[3] if sheet.closed else 0
     scale = 1 << sheet.barycenter_bits if widths.report.divided else area
-    inside = area > 0 and x <= (sheet.columns - 1) * scale and y <= (sheet.rows - 1) * scale
-    return inside and all(cells <= area or cells == (1 << widths.area_bits) - 1 for cells in past)
+    if not (area > 0 and x <= (sheet.columns - 1) * scale and y <= (sheet.rows - 1) * scale):
+        return False
+    if turned > area and turned != (1 << widths.area_bits) - 1:
+        return False
+    return not sheet.extent or _has_extent(record, scale, sheet)
+
+
+def _has_extent(record: list[int], scale: int, sheet: Sheet) -> bool:
+    """Whether a zone with the barycenter (x, y) / ``scale`` may have its extent.
+
+    It is on the sheet, has a place for each cell, is not longer or wider than so many cells reach, and holds the
+    barycenter.
+    """
+    area, x, y, *turned, left, right, top, bottom = record
+    if max(left, right) >= sheet.columns or not top <= bottom < sheet.rows or (left > right and not sheet.closed):
+        return False
+    width, height = (right - left) % sheet.columns + 1, bottom - top + 1
+    if not max(width, height) <= area <= width * height or not top * scale <= y <= bottom * scale:
+        return False
+    if turned and turned[0] >= area:
+        return (left, right) == (0, sheet.columns - 1)
+    along = (x + sheet.columns * sum(turned) - left * scale) % (sheet.columns * scale)
+    return width == sheet.columns or along <= (width - 1) * scale
 
 
 def _records(data: bytes, widths: Widths) -> list[list[int]]:

@@ -40,7 +40,8 @@ class PacketTable:
     """(n + 1,) starts of each packet's records."""
     records: np.ndarray
     """(m, 3) int64 of all packets in order: area and sums, or area and barycenter; (m, 4) for a sheet whose ends meet,
-    as in :attr:`contactfpga.wire.protocol.Frame.moments`; (m, columns) with ``report = "cells"``.
+    as in :attr:`contactfpga.wire.protocol.Frame.moments`; with extents four more columns, those of
+    :attr:`contactfpga.wire.protocol.Frame.extents`; (m, columns) with ``report = "cells"``.
     """
 
     def part(self, start: int, end: int) -> PacketTable:

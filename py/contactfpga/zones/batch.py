@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contactfpga import surfaces
-from contactfpga.wire.protocol import FAULT, MISMATCH, MOTION, OVERFLOW
+from contactfpga.wire.protocol import FAULT, MISMATCH, MOTION, OVERFLOW, sums_of
 from contactfpga.zones import around, tables
+from contactfpga.zones.box import box_mm
 from contactfpga.zones.run import Run
-from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
+from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones, dtype_of
 
 if TYPE_CHECKING:
     import pandas
@@ -47,6 +49,13 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 """:data:`ZONE_DTYPE` without the sums, for ``report = "barycenter"``."""
 
 
+@functools.cache
+def zone_dtype_of(divided: bool, extent: bool) -> np.dtype[np.void]:
+    """:data:`ZONE_DTYPE` or, with barycenters, :data:`DIVIDED_ZONE_DTYPE`; of a Skin with ``extent`` also the fields
+    ``box`` and ``box_mm`` of :class:`Zone`, four numbers each."""
+    return np.dtype(_WHICH + dtype_of(divided, extent).descr)
+
+
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch:
     """Consecutive frames as arrays: ``zones["x_mm"]`` over all zones, in mm; ``frames["time_us"]`` over all frames, in
@@ -61,7 +70,7 @@ class Batch:
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
     zones: np.ndarray
-    """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and of their zones."""
+    """(m,) of :func:`zone_dtype_of`, in the order of the frames and of their zones."""
     faults: tuple[tuple[str, ...], ...] = ()
     """:attr:`Zones.faults` of each frame."""
     first: int = 0
@@ -150,9 +159,9 @@ def _describe(run: Run, out: np.ndarray) -> None:
 def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray) -> np.ndarray:
     sheet = items[0].sheet
     divided = sheet.report == "barycenter"
-    records, windings = _records(items)
+    records, windings, extents = _records(items)
     area, x, y = records.T
-    out = np.zeros(len(records), DIVIDED_ZONE_DTYPE if divided else ZONE_DTYPE)
+    out = np.zeros(len(records), zone_dtype_of(divided, sheet.extent))
     which = np.repeat(np.arange(len(frames)), counts)
     out["frame"] = which
     out["time_us"] = frames["time_us"][which]
@@ -169,17 +178,25 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     for name, sums, pitch in (("x_mm", x, sheet.pitch_x_mm), ("y_mm", y, sheet.pitch_y_mm)):
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
     out["x_mm"][out["winding"] != ""] = math.nan
+    if sheet.extent:
+        out["box"], out["box_mm"] = extents, box_mm(extents, sheet)
     out["point_mm"], out["normal"] = surfaces.of(sheet).place(out["x_mm"], out["y_mm"])
     if sheet.ghosts:
         out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]
 
 
-def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 3) :attr:`Zones.records`, and for a sheet whose ends meet (m,) indexes in :data:`around.WINDINGS`."""
+def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(m, 3) :attr:`Zones.records`; for a sheet whose ends meet (m,) indexes in :data:`around.WINDINGS`; with extents
+    (m, 4) of :class:`Box`."""
     sheet = items[0].sheet
+    records = np.concatenate([one.carried if isinstance(one, Run) else _carried(one) for one in items])
+    records, extents = records[:, : sums_of(sheet)], records[:, sums_of(sheet) :]
     if not sheet.closed:
-        records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])
-        return records, np.zeros(0, np.int64)
-    records = np.concatenate([one.carried if isinstance(one, Run) else one.closed_records for one in items])
-    return around.flat(records, sheet.columns), around.windings(records)
+        return records, np.zeros(0, np.int64), extents
+    return around.flat(records, sheet.columns), around.windings(records), extents
+
+
+def _carried(one: Zones) -> np.ndarray:
+    records = one.closed_records if one.sheet.closed else one.records
+    return records if one.frame.extents is None else np.concatenate([records, one.frame.extents], axis=1)

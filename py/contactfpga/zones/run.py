@@ -25,7 +25,7 @@ class Run:
     starts: np.ndarray
     """(n + 1,) starts of each frame's records; the first may be above 0."""
     records: np.ndarray
-    """(m, 3) int64, or (m, 4) for a sheet whose ends meet; (m, columns) bitmap rows with ``report = "cells"``."""
+    """:attr:`contactfpga.wire.table.PacketTable.records`."""
     times_us: np.ndarray
     line: HostLine | HostLines | None
     """Arrival times and times on the host's clock, for all frames or each; None in a recording."""
@@ -51,7 +51,7 @@ class Run:
 
     @property
     def carried(self) -> np.ndarray:
-        """(k, 3) or (k, 4) records of the run's own frames."""
+        """(k, ...) records of the run's own frames."""
         return self.records[self.starts[0] : self.starts[-1]]
 
     def __getitem__(self, index: int) -> Zones:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra
+from contactfpga.zones.box import Box, BoxMm
 
 if TYPE_CHECKING:
     import pandas
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 VECTORS = {
     "point_mm": ("point_x_mm", "point_y_mm", "point_z_mm"),
     "normal": ("normal_x", "normal_y", "normal_z"),
+    "box": Box._fields,
+    "box_mm": tuple(f"box_{name}" for name in BoxMm._fields),
 }
 
 

@@ -17,6 +17,7 @@ from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import around, ghosts, labels, motion, tables
+from contactfpga.zones.box import Box, BoxMm, box_mm
 from contactfpga.zones.units import UnitHistory, UnitSamples
 
 if TYPE_CHECKING:
@@ -42,6 +43,15 @@ DTYPE = np.dtype(
 _UNSENT = ("sum_x", "sum_y")
 DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if name not in _UNSENT])
 """:data:`DTYPE` without the sums, for ``report = "barycenter"``."""
+_BOXES = [("box", np.int64, (4,)), ("box_mm", np.float64, (4,))]
+
+
+@functools.cache
+def dtype_of(divided: bool, extent: bool) -> np.dtype[np.void]:
+    """:data:`DTYPE` or, with barycenters, :data:`DIVIDED_DTYPE`; of a Skin with ``extent`` also the fields ``box`` and
+    ``box_mm`` of :class:`Zone`, four numbers each."""
+    dtype = DIVIDED_DTYPE if divided else DTYPE
+    return np.dtype(dtype.descr + _BOXES) if extent else dtype
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -78,6 +88,10 @@ class Zone:
     winding: str = ""
     """On a sheet whose ends meet: ``ring`` if a path of the zone's cells closes around the cylinder; ``wound`` if none
     does, but the cells lie on more than two turns. Otherwise ""."""
+    box: Box | None = None
+    """First and last column and row of the cells; None unless the Skin has ``extent``."""
+    box_mm: BoxMm | None = None
+    """Outer edges of these cells in mm; None unless the Skin has ``extent``."""
 
     @property
     def centroid_mm(self) -> tuple[float, float] | None:
@@ -265,9 +279,9 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def array(self) -> np.ndarray:
-        """(n,) read-only structured array of :data:`DTYPE`, with NaN for None; without sums for ``report =
+        """(n,) read-only structured array of :func:`dtype_of`, with NaN for None; without sums for ``report =
         "barycenter"``."""
-        dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
+        dtype = dtype_of(self.frame.barycenters is not None, self.sheet.extent)
         array = np.zeros(len(self), dtype)
         for row, zone in zip(array, self._zones):
             for name in dtype.names or ():
@@ -294,6 +308,9 @@ class Zones(Sequence[Zone]):
         for index, winding in enumerate(self.windings if self.sheet.closed else ()):
             if winding:
                 zones[index] = dataclasses.replace(zones[index], x_mm=None, point_mm=None, normal=None, winding=winding)
+        if (extents := self.frame.extents) is not None:
+            for index, (box, edges) in enumerate(zip(extents.tolist(), box_mm(extents, self.sheet).tolist())):
+                zones[index] = dataclasses.replace(zones[index], box=Box(*box), box_mm=BoxMm(*edges))
         zones.sort(key=order)
         return tuple(zones)
 
@@ -407,6 +424,8 @@ class Zones(Sequence[Zone]):
         values = dataclasses.asdict(zone)
         if not self.sheet.closed:
             del values["winding"]
+        if not self.sheet.extent:
+            del values["box"], values["box_mm"]
         return values
 
 

@@ -24,6 +24,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.core import BYTES, RECORDS, Core
 from contactfpga_hdl.link.records import closing_layout, word_bits
 from contactfpga_hdl.payloads import zone_layout
+from contactfpga_hdl.report.divide import barycenter_layout
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.golden.trace import Timeline
 from contactfpga_sim.verify.cosim.record import InputDriver
@@ -126,7 +127,7 @@ def record_fields(skin: Skin) -> dict[str, int]:
     if not skin.derived.report.zones:
         return {"cells": skin.columns}
     if skin.derived.report.divided:
-        return dict(zip(("area", "x", "y"), skin.derived.record_bits, strict=True))
+        return {name: len(Signal(shape)) for name, shape in barycenter_layout(skin.derived).members.items()}
     return {name: len(Signal(shape)) for name, shape in zone_layout(skin.derived).members.items()}
 
 

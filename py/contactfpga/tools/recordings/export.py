@@ -35,12 +35,17 @@ COLUMNS = {
     "ghost": (np.bool_, "other pressed switches may have made it"),
     "winding": (np.str_, "ring or wound: it leads around a sheet whose ends meet, and has no x; else empty"),
     "flags": (np.uint8, "of the frame: the bits of contactfpga_msgs/Zones"),
+    "left": (np.int16, "first column of the zone; beyond right, it goes over the seam; -1: the board sends no extents"),
+    "right": (np.int16, "last column of the zone, or -1"),
+    "top": (np.int16, "first row of the zone, or -1"),
+    "bottom": (np.int16, "last row of the zone, or -1"),
 }
 """Type and meaning of each column."""
 
 ROWS = 1 << 16
 
-_NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False, "")
+_NO_BOX = (-1, -1, -1, -1)
+_NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False, ""), _NO_BOX
 Piece = dict[str, np.ndarray]
 
 
@@ -54,25 +59,28 @@ def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
         number = counts[link] = counts.get(link, -1) + 1
         flags = flag_bits(zones.flags)
         head = t_s, link, number, zones.time_us
-        found += [(*head, *values, flags) for values in _zones(zones, tracker)]
+        found += [(*head, *values, flags, *box) for values, box in _zones(zones, tracker)]
         if len(found) >= rows:
             yield _arrays(found)
             found = []
     yield _arrays(found)
 
 
-def _zones(zones: Zones, tracker: Tracker) -> list[tuple[object, ...]]:
+def _zones(zones: Zones, tracker: Tracker) -> list[tuple[tuple[object, ...], tuple[int, ...]]]:
     ids = {id(track.zone): track.id for track in tracker.update(zones).active if not track.held}
     return [
         (
-            number,
-            ids.get(id(zone), -1),
-            zone.area_mm2,
-            np.nan if zone.x_mm is None else zone.x_mm,
-            np.nan if zone.y_mm is None else zone.y_mm,
-            zone.area_cells,
-            zone.ghost,
-            zone.winding,
+            (
+                number,
+                ids.get(id(zone), -1),
+                zone.area_mm2,
+                np.nan if zone.x_mm is None else zone.x_mm,
+                np.nan if zone.y_mm is None else zone.y_mm,
+                zone.area_cells,
+                zone.ghost,
+                zone.winding,
+            ),
+            zone.box or _NO_BOX,
         )
         for number, zone in enumerate(zones)
     ] or [_NOTHING]

@@ -94,6 +94,7 @@ class Stage:
         self._color(picture.tile_colors(zones, moment.truth))
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
         self._draw_lines("circles", found.circles, picture.CIRCLE, 3.0)
+        self._draw_lines("boxes", picture.boxes(zones, self.tiles.surface, self._lift_mm), picture.CIRCLE, 1.0)
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)

@@ -1,4 +1,4 @@
-"""Cost of zones over the seam of a closed sheet, for docs/labelling.md."""
+"""Cost of zones over the seam of a closed sheet and of extents, for docs/labelling.md."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ COLUMNS = 8
 AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
 
 
-def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> Skin:
-    around = AROUND if closed else {}
-    return Skin(rows=lines, columns=lines, connectivity=connectivity, labeller=labeller, settle_us=30.0, **around)
+def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool, extent: bool = False) -> Skin:
+    values = {"connectivity": connectivity, "labeller": labeller, "extent": extent, **(AROUND if closed else {})}
+    return Skin(rows=lines, columns=lines, settle_us=30.0, **values)
 
 
 def clocks_table() -> str:
@@ -34,7 +34,8 @@ def clocks_table() -> str:
 
 
 def size_table() -> str:
-    head = ["labeller", "connectivity", "16x16: open", "closed", "32x32: open", "closed"]
+    sheets = ("open", "open, extents", "closed", "closed, extents")
+    head = ["labeller", "connectivity", *(f"{lines}x{lines}: {sheet}" for lines in (16, 32) for sheet in sheets)]
     rows = [[*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
             for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
     return writer.table_of([head, *rows])
@@ -60,7 +61,9 @@ def most(labeller: Labeller, connectivity: int) -> list[str]:
 
 
 def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
-    skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
+    skins = (
+        skin_of(lines, connectivity, labeller, closed, extent) for closed in (False, True) for extent in (False, True)
+    )
     return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
 
 

@@ -272,6 +272,12 @@ class Facts:
         return bits(self.rows * self.columns - 1), bits((self.columns - 1) * steps), bits((self.rows - 1) * steps)
 
     @functools.cached_property
+    def extent_bits(self) -> tuple[int, ...]:
+        """Bits of smallest and largest column, smallest and largest row, in records that have them."""
+        column, row = bits(self.columns - 1), bits(self.rows - 1)
+        return (column, column, row, row) if self.skin.extent else ()
+
+    @functools.cached_property
     def division(self) -> int:
         """Q: clocks of a division: one per bit of a row or column number, one per fraction bit, and rounding."""
         return math.ceil(math.log2(max(self.rows, self.columns))) + self.skin.barycenter_bits + 1
@@ -280,10 +286,11 @@ class Facts:
     def item_bytes(self) -> int:
         """Bytes per zone record or bitmap row."""
         if self.divided:
-            width = sum(self.barycenter_bits)
+            width = sum(self.barycenter_bits) + sum(self.extent_bits)
         else:
             sums = self.area_bits + self.sum_x_bits + self.sum_y_bits
-            width = sums + (self.area_bits if self.skin.closed else 0) if self.zones else self.columns
+            record = sums + (self.area_bits if self.skin.closed else 0) + sum(self.extent_bits)
+            width = record if self.zones else self.columns
         return -(-width // 8)
 
     @functools.cached_property

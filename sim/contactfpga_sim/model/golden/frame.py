@@ -154,10 +154,12 @@ class Divider(Queue):
     def _item(self, data: int) -> int:
         facts = self._facts
         area, rest = data % 2**facts.area_bits, data // 2**facts.area_bits
-        sum_x, sum_y = rest % 2**facts.sum_x_bits, rest // 2**facts.sum_x_bits
+        sum_x, rest = rest % 2**facts.sum_x_bits, rest // 2**facts.sum_x_bits
+        sum_y, extent = rest % 2**facts.sum_y_bits, rest // 2**facts.sum_y_bits
         x, y = (barycenter(total, area, facts.skin.barycenter_bits) for total in (sum_x, sum_y))
         widths = facts.barycenter_bits
-        return join(((area % 2 ** widths[0], widths[0]), (x, widths[1]), (y, widths[2])))[0]
+        divided = ((area % 2 ** widths[0], widths[0]), (x, widths[1]), (y, widths[2]))
+        return join((*divided, (extent, sum(facts.extent_bits))))[0]
 
 
 def join(fields: tuple[tuple[int, int], ...]) -> tuple[int, int]:

@@ -8,7 +8,16 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.model.golden.zones import Departure, LabellerRule, Labelling, Strips, closed_flood, flood, moments
+from contactfpga_sim.model.golden.zones import (
+    Departure,
+    LabellerRule,
+    Labelling,
+    Strips,
+    closed_pieces,
+    extent,
+    flood,
+    moments,
+)
 
 
 def labelling(
@@ -31,21 +40,23 @@ def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labelle
 def exact(cells: np.ndarray, connectivity: int, strips: Strips, closed: bool = False) -> Labelling:
     """Work of an exact labeller on an (R, C) bool frame; ``strips``: its clocks, as ``LabellerRule.strips``."""
     last_clock, busy, end = (clocks[0] for clocks in strips(cells[None], connectivity))
-    labels, turned = closed_flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
+    labels, pieces = closed_pieces(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
     departures = []
-    for zone in range(1, len(turned) + 1):
+    for zone, (turned, span) in enumerate(pieces, 1):
         row = min(int(np.nonzero(labels == zone)[0].max()) + 1, len(cells) - 1)
         columns = (labels[max(row - 1, 0) : row + 1] == zone).any(axis=0)
-        departures.append(Departure(row, int(last_clock[row, columns].max()), *moments(labels, zone), turned[zone - 1]))
+        clock = int(last_clock[row, columns].max())
+        box = (*span, *extent(labels, zone)[2:])
+        departures.append(Departure(row, clock, *moments(labels, zone), turned, box))
     departures.sort(key=lambda zone: (zone.row, zone.clock))
     places = [(zone.row, zone.clock) for zone in departures]
     assert len(set(places)) == len(places), "two zones would leave in one clock"
     return Labelling(tuple(busy.tolist()), int(end[-1]), tuple(departures))
 
 
-def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
+def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[tuple[int, tuple[int, int]]]]:
     labels, count = flood(cells, connectivity)
-    return labels, [0] * count
+    return labels, [(0, extent(labels, zone)[:2]) for zone in range(1, count + 1)]
 
 
 def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

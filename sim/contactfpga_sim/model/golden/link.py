@@ -151,8 +151,8 @@ class Link:
         self._slot_over = None
 
     def slot_over(self, cycle: int) -> int | None:
-        """Cycle in which the whole slot was taken, if not after ``cycle``. The wire advances no farther, as the next slot
-        may be offered before ``cycle``."""
+        """Cycle in which the whole slot was taken, if not after ``cycle``. The wire advances no farther, because the
+        next slot may be offered before ``cycle``."""
         while self._slot and (taken := self._line.next_take(cycle)) is not None and taken <= cycle:
             self.advance(taken)
         return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None

@@ -185,7 +185,7 @@ class Pipeline:
         facts = self._facts
         if facts.zones:
             records = [
-                (handed[zone.row] + zone.clock, self._record(zone, _sum_y(zone, taken, places)))
+                (handed[zone.row] + zone.clock, self._record(zone, _sum_y(zone, taken, places), places))
                 for zone in work.departures
             ]
             end = handed[-1] + work.end
@@ -198,11 +198,13 @@ class Pipeline:
         self.well.append(free - 1)
         return free
 
-    def _record(self, zone: Departure, sum_y: int) -> int:
+    def _record(self, zone: Departure, sum_y: int, places: Sequence[int]) -> int:
         facts = self._facts
         fields = [(zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)]
         if facts.skin.closed:
             fields.append((zone.turned, facts.area_bits))
+        left, right, top, bottom = zone.extent
+        fields += zip((left, right, places[top], places[bottom]), facts.extent_bits)
         return join(tuple(fields))[0]
 
 

@@ -27,6 +27,10 @@ class Departures:
     """(n, 3) int64: area, sum x, sum y in cells, in order of departure within a frame; on closed sheets (n, 4), with
     :func:`contactfpga_sim.model.golden.zones.turned`."""
 
+    extents: np.ndarray
+    """(n, 4) int64: smallest and largest column, smallest and largest row, in the same order; on closed sheets with
+    the columns of :func:`contactfpga_sim.model.golden.zones.closed_pieces`."""
+
     def sorted_moments(self) -> np.ndarray:
         """Moments, sorted by area, sum x, sum y within each frame."""
         area, sum_x, sum_y = self.moments.T[:3]
@@ -52,6 +56,7 @@ def all_departures(
         row=np.concatenate([np.zeros(0, int), *(part.row for part in parts)]),
         clock=np.concatenate([np.zeros(0, int), *(part.clock for part in parts)]),
         moments=np.concatenate([np.zeros((0, 3 + closed), int), *(part.moments for part in parts)]),
+        extents=np.concatenate([np.zeros((0, 4), int), *(part.extents for part in parts)]),
     )
 
 
@@ -118,10 +123,22 @@ def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | 
     if closed:
         fields.append(turned(zone, turns[frames], disagree[frames], rows * columns))
     moments = np.stack(fields, axis=1)
+    unwrapped = x + columns * turns[frames]
+    left, right = _range(unwrapped, zone, total)
+    whole = (right - left >= columns) | (np.bincount(zone, disagree[frames], total) > 0) & closed
+    left, right = np.where(whole, 0, left % columns), np.where(whole, columns - 1, right % columns)
+    extents = np.stack([left, right, *_range(y, zone, total)], axis=1)
     owner = roots // (rows * columns)
     order = np.lexsort((clock, leaves, owner))
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
-    return Departures(offsets, leaves[order], clock[order], moments.astype(int)[order])
+    return Departures(offsets, leaves[order], clock[order], moments.astype(int)[order], extents[order])
+
+
+def _range(places: np.ndarray, zone: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    least, most = np.full(count, places.max(initial=0)), np.full(count, places.min(initial=0))
+    np.minimum.at(least, zone, places)
+    np.maximum.at(most, zone, places)
+    return least, most
 
 
 def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -42,6 +42,12 @@ def moments(labels: np.ndarray, zone: int) -> tuple[int, int, int]:
     return len(x), int(x.sum()), int(y.sum())
 
 
+def extent(labels: np.ndarray, zone: int) -> tuple[int, int, int, int]:
+    """Smallest and largest column, smallest and largest row, of a label's cells."""
+    y, x = np.nonzero(labels == zone)
+    return int(x.min()), int(x.max()), int(y.min()), int(y.max())
+
+
 def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
     """Area, sum x, sum y of every zone of an (R, C) bool frame, sorted."""
     labels, count = flood(np.asarray(cells, bool), connectivity)
@@ -53,15 +59,25 @@ def closed_flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list
 
     Returns an (R, C) int array as :func:`flood`, and :func:`turned` of each piece.
     """
+    labels, pieces = closed_pieces(cells, connectivity)
+    return labels, [past for past, _ in pieces]
+
+
+def closed_pieces(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[tuple[int, tuple[int, int]]]]:
+    """As :func:`closed_flood`, and beside each :func:`turned` the first and last column of the piece, counted from left
+    to right over the seam: all columns if the piece goes all the way around."""
     columns = cells.shape[1]
     labels = np.zeros(cells.shape, int)
-    pieces: list[int] = []
+    pieces: list[tuple[int, tuple[int, int]]] = []
     for y, x in zip(*map(np.ndarray.tolist, np.nonzero(cells)), strict=True):
         if not labels[y, x]:
             unrolled, ring = _unroll(cells, connectivity, (y, x))
             for row, column in unrolled:
                 labels[row, column] = len(pieces) + 1
-            pieces.append(turned([place // columns for place in unrolled.values()], ring, cells.size))
+            first, last = min(unrolled.values()), max(unrolled.values())
+            whole = ring or last - first >= columns
+            span = (0, columns - 1) if whole else (first % columns, last % columns)
+            pieces.append((turned([place // columns for place in unrolled.values()], ring, cells.size), span))
     return labels, pieces
 
 
@@ -106,6 +122,8 @@ class Departure:
     sum_y: int
     turned: int = 0
     """:func:`turned` of the zone on a closed sheet."""
+    extent: tuple[int, int, int, int] = (0, 0, 0, 0)
+    """:func:`extent` of the zone; on a closed sheet with the columns of :func:`closed_pieces`."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -31,6 +31,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "labeller": tuple(LABELLERS),
     "report": tuple(REPORTS),
     "barycenter_bits": (4, 0, 3),
+    "extent": (False, True),  # where labeller and report have it
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),
     "capacity": ("default", "one", "half"),
@@ -155,6 +156,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
         values["project_us"] = choice["project_us"]
     if choice["report"] == "barycenter":
         values["barycenter_bits"] = choice["barycenter_bits"]
+    values["extent"] = choice["extent"] and LABELLERS[choice["labeller"]].extent and choice["report"] != "cells"
     most = max_zones(rows, columns, choice["connectivity"], ends_meet)
     if choice["capacity"] != "default":
         values["zone_capacity"] = 1 if choice["capacity"] == "one" else -(-most // 2)
