@@ -8,7 +8,6 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.extent import extent_of_run
 from contactfpga_hdl.label.steps import join_layout, nesting, place_bits, place_of, step_layout, waiting
 from contactfpga_hdl.util.stack import Stack
 
@@ -283,6 +282,8 @@ class Join(wiring.Component):
         step = self.step
         extent = {}
         if self.derived.skin.extent:
+            from contactfpga_hdl.label.extent import extent_of_run
+
             extent = extent_of_run(self.derived, step.start, step.past - 1, step.y)
         below = Array(math.comb(column, 2) for column in range(self.derived.skin.columns + 1))
         return [

@@ -14,7 +14,6 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.extent import larger, lifted
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.steps import Walk, join_layout, kept_layout, place_bits, zone_of
 from contactfpga_hdl.payloads import labeller_ports, record_layout
@@ -99,6 +98,8 @@ class Sum(wiring.Component):
 
             above = unwrapped(m, self.derived, join, kept, found, group, stored)
         if self.derived.skin.extent:
+            from contactfpga_hdl.label.extent import larger, lifted
+
             parts = zip((kept, join.run, found), (above[0], above[2], above[1]))
             extent = larger(lifted(self.derived, part, up) for part, up in parts)
             m.d.comb += [group[name].eq(field) for name, field in extent.items()]

@@ -11,7 +11,6 @@ from amaranth.lib import data, memory, wiring
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.around import SerialTurns, stored_turns
-from contactfpga_hdl.label.extent import extent_of_run, larger, lifted
 from contactfpga_hdl.label.steps import kept_layout, nesting, place_of, zone_of
 from contactfpga_hdl.payloads import labeller_ports
 
@@ -314,6 +313,8 @@ class SerialLabeller(wiring.Component):
                 more = found.moments[name] | Mux(acts.adds, share, 0)
                 m.d.sync += group.moments[name].eq(group.moments[name] + more)
             if self.derived.skin.extent:
+                from contactfpga_hdl.label.extent import extent_of_run, larger, lifted
+
                 fields = extent_of_run(self.derived, walk.column, walk.column, walk.y)
                 cell = {name: Mux(acts.adds, field, 0) for name, field in fields.items()}
                 kept, joins, adds = (

@@ -7,7 +7,6 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.extent import sent_extent, stored_extent
 from contactfpga_hdl.payloads import moments_layout, row_layout, row_number
 
 
@@ -39,12 +38,11 @@ def step_layout(derived: Derived) -> data.StructLayout:
 def join_layout(derived: Derived) -> data.StructLayout:
     """A step's addition to its zone, and the zone's fate."""
     turns = {"begun": 1, "down": 1, "turn": 1, "ring": 1, "first_turn": 1}  # docs/labelling.md#around-a-cylinder
-    stored = stored_extent(derived) if derived.skin.extent else {}
     return data.StructLayout(
         {
             "end": 1,
             "closes": 1,  # the next step starts from nothing
-            "run": data.StructLayout(moments_layout(derived).members | stored),  # of the new run, to add
+            "run": data.StructLayout(moments_layout(derived).members | extent_of(derived)),  # of the new run, to add
             "load": 1,  # add the group that was looked up
             "again": 1,  # add the group that the step before stored
             "store": 1,  # put what there is in ``place``
@@ -94,8 +92,16 @@ def _index(one_hot: Value, width: int) -> Value:
 def kept_layout(derived: Derived) -> data.StructLayout:
     """Stored data of a group of cells: moments, on a sheet whose ends meet their turns, and an extent."""
     turned = turned_layout(derived) if derived.skin.closed else {}
-    stored = stored_extent(derived) if derived.skin.extent else {}
-    return data.StructLayout(moments_layout(derived).members | turned | stored)
+    return data.StructLayout(moments_layout(derived).members | turned | extent_of(derived))
+
+
+def extent_of(derived: Derived) -> dict[str, int]:
+    """Stored fields of an extent, if the Skin has one."""
+    if not derived.skin.extent:
+        return {}
+    from contactfpga_hdl.label.extent import stored_extent
+
+    return stored_extent(derived)
 
 
 def zone_of(derived: Derived, group: data.View) -> Value:
@@ -103,7 +109,11 @@ def zone_of(derived: Derived, group: data.View) -> Value:
     if derived.skin.closed:
         wound = group.wound.replicate(len(group.turned))
         zone.append(Mux(group.ring, group.area, group.turned | wound))
-    return Cat(*zone, sent_extent(derived, group)) if derived.skin.extent else Cat(zone)
+    if derived.skin.extent:
+        from contactfpga_hdl.label.extent import sent_extent
+
+        zone.append(sent_extent(derived, group))
+    return Cat(zone)
 
 
 def turned_layout(derived: Derived) -> dict[str, int]:
