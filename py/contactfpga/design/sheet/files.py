@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet import gerber, kicad, orders, picture
+from contactfpga.design.sheet import gerber, kicad, orders, picture, tube
 from contactfpga.design.sheet.caps import Caps, feet, stl
 from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.layout import Layout
@@ -42,6 +42,8 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str, pad_mm: floa
     }
     if (frame := caps.frame()) is not None:
         contents[f"{NAME}-frame.stl"] = stl(frame)
+    if skin.closed:
+        contents[f"{NAME}-clamp.stl"] = stl(tube.clamps(skin, drawing.tab_mm))
     if pad_mm is not None:
         contents[f"{NAME}-feet.stl"] = stl(feet(pad_mm))
     for name, content in contents.items():

@@ -38,7 +38,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns 1 if KiCad was run and found something."""
-    from contactfpga.design.sheet import check, files, houses
+    from contactfpga.design.sheet import check, files, houses, tube
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted
 
@@ -57,14 +57,14 @@ def run(args: argparse.Namespace) -> int:
         check.require()
     names = files.write(folder, layout, layer, text, cover.bed.pad_mm if cover and cover.bed else None)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
-    left, top, right, bottom = layout.drawing.outline
+    left, top, right, bottom = layout.drawing.bounds()
     by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
-    large = "" if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
+    note = tube.note(skin) if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
     answer: dict[str, Any] = {
         "folder": str(folder),
         "files": names,
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
-        "note": large,
+        "note": note,
         "by_hand": collections.Counter(by_hand),
         "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
         "caps": {
@@ -107,8 +107,9 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     for words, count in answer["by_hand"].items():
         terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
     cap = answer["caps"]
-    sinks = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
-    framed = sinks if cap["sinks_mm"] else "without a frame, for which the switches are too close or the board too bent"
+    framed = "without a frame, for which the switches are too close or the board too bent"
+    if cap["sinks_mm"] is not None:
+        framed = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
     terminal.say(
         f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
         f"{cap['plunger_mm']:g} mm; {framed}",
