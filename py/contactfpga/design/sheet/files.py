@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from contactfpga.boards import wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import gerber, kicad, orders, picture, tube
 from contactfpga.design.sheet.caps import Caps, feet, stl
-from contactfpga.design.sheet.drawing import BOARDS
+from contactfpga.design.sheet.drawing import BOARDS, GND
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 
@@ -61,11 +62,29 @@ def packed(texts: Mapping[str, str]) -> bytes:
 
 
 def connectors_list(layout: Layout) -> str:
-    """The connector list as CSV: the board wire of each pin, named as by ``contactfpga build --wiring``."""
-    plugs = [one for one in layout.drawing.placed if one.reference.startswith("J")]
-    ends = {line.pin: line.net for line in layout.lines}
-    rows = [(one.reference, pin, net, ends.get(net, "")) for one in plugs for pin, net in one.nets.items()]
-    return orders.table([("connector", "pin", "wire", "line"), *rows])
+    """The :func:`connections` as CSV."""
+    rows = [(connector, *row) for connector, found in connections(layout).items() for row in found]
+    return orders.table([("connector", "pin", "wire", "line", "board"), *rows])
+
+
+def connections(layout: Layout) -> dict[str, list[tuple[str, str, str, str]]]:
+    """The pins of each connector of the sheet: number, wire as named by ``contactfpga build --wiring``, line, and for a
+    board with single wires its pin. There a ground that follows no line stays ``open``, and under "" are the wires to
+    other things, with their grounds."""
+    board, ends = layout.board, {line.pin: line.net for line in layout.lines}
+    wires = [wire for wire in wiring.wires(board, layout.skin) if wire.pin in board.printed] if board else []
+    places = {wire.port: board.printed[wire.pin] for wire in wires if board}
+    rails = {net: iter(pins) for net, pins in board.rails.items()} if board else {}
+    found: dict[str, list[tuple[str, str, str, str]]] = {}
+    for one in (one for one in layout.drawing.placed if one.reference.startswith("J")):
+        before, rows = "", found.setdefault(one.reference, [])
+        for pin, net in one.nets.items():
+            rail = rails.get(net, iter(())) if net != GND or before in ends else iter(())
+            rows.append((pin, net, ends.get(net, ""), places.pop(net, "") or next(rail, "open" if rails else "")))
+            before = net
+    others = [("", wire.port, wire.line.leads_to, places[wire.port]) for wire in wires if wire.port in places]
+    others += [("", GND, "ground of these", place) for place in rails.get(GND, ())]
+    return found | ({"": others} if others else {})
 
 
 def circuit_table(circuit: Circuit) -> str:

@@ -62,6 +62,7 @@ class Layout:
     drawing: Drawing
     lines: tuple[Line, ...]
     """Lines from left to right, as they leave the matrix."""
+    board: BoardSpec | None
 
 
 _FIDUCIAL_X = 6.5
@@ -91,7 +92,7 @@ def lay_out(
     _outline(drawing, skin, (left, top, right), margin_mm)
     _fiducials(drawing)
     _print(drawing, skin, switch)
-    return Layout(skin, fitted, switch, drawing, tuple(lines))
+    return Layout(skin, fitted, switch, drawing, tuple(lines), board)
 
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:

@@ -83,7 +83,10 @@ def _lines(layout: Layout) -> Iterator[tuple[str, str]]:
                 if one.reference.startswith(letter)
             ]
             if places:
-                yield "stiffeners", f"FR-4 of 0.8 mm on the {where}; mm, middles from the lower left: {', '.join(places)}"
+                yield (
+                    "stiffeners",
+                    f"FR-4 of 0.8 mm on the {where}; mm, middles from the lower left: {', '.join(places)}",
+                )
     else:
         yield "material", f"FR-4, {thickness:g} mm, 35 um of finished copper"
     bare = not layout.switch.part.soldered

@@ -1,7 +1,7 @@
 """A flexible sheet around a tube: how far it may be bent, and the clamps that hold the ends of a closed one.
 
 A closed sheet has two tabs, which continue its upper and lower margin over the other end. A clamp at each is two bent
-plates, one below the sheet and one above. Two screws M3 go through both plates and the holes of the sheet into the tube.
+plates, one below the sheet and one above. Two screws M3 go through both and through the holes of the sheet.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ BEND = 10
 """Least radius of a flex with two layers that is bent once, in thicknesses: IPC-2223 as cited by T. Plemel, 'With Flex,
 Sometimes You Gotta Break the Rules', I-Connect007, 2021-04-05."""
 ROOM_MM = 2.0
-"""Distance between sheet and tube, for the parts on the back; the highest but the headers is an SOIC-16 of 1.75 mm (JEDEC
-MS-012)."""
+"""Distance between sheet and tube, for the parts on the back. Without the headers the highest is an SOIC-16 of 1.75 mm
+(JEDEC MS-012)."""
 PLATE_MM = 2.0
 """Thickness of a clamp's upper plate; the lower one fills :data:`ROOM_MM`."""
 STEP_MM = 0.5
@@ -60,8 +60,8 @@ def note(skin: Skin) -> str:
     )
     if skin.closed:
         words += (
-            f"; the tube is {tube_mm(skin):.1f} mm wide and ends below the connectors, where the sheet stays flat; four "
-            "screws M3 through sheet-clamp.stl hold the tabs"
+            f"; the tube is {tube_mm(skin):.1f} mm wide and ends before the connectors, where the sheet stays flat; "
+            "four screws M3 through sheet-clamp.stl hold the tabs"
         )
     return words
 

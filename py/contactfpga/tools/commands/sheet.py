@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import collections
 import dataclasses
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
             "plunger_mm": layer.switch.closed_by,
             "sinks_mm": layer.sinks_mm if f"{files.NAME}-frame.stl" in names else None,
         },
+        "wiring": files.connections(layout) if layout.board and layout.board.rails else {},
         "circuit": {
             name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
         },
@@ -115,6 +117,16 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
         f"{cap['plunger_mm']:g} mm; {framed}",
         hang=2,
     )
+    if answer["wiring"]:
+        terminal.say(
+            "wires: pin of the sheet, name, pin of the board by its print (GP, GN) or number; last, without the sheet"
+        )
+    columns = [
+        [f"{connector} {pin}".ljust(7 * bool(connector)) + f"{wire:12}{place:10}" for pin, wire, _, place in rows]
+        for connector, rows in answer["wiring"].items()
+    ]
+    for line in itertools.zip_longest(*columns, fillvalue=""):
+        terminal.say(f"  {''.join(line)}".rstrip())
     found = answer["extracted"]
     terminal.say(
         "lines: rows {:.2f} to {:.2f} ohm, columns {:.2f} to {:.2f} ohm; a row to a column {:.2f} to {:.2f} pF, to the "
