@@ -82,7 +82,6 @@ def lay_out(
     for a radius too small to bend to, and for lines or tabs without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
-    tube.check(skin)
     matrix = _Matrix(skin, switch)
     lines = matrix.lines()
     drawing = Drawing()
@@ -296,9 +295,9 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
     for y in (drawing.outline[1] + inset, drawing.outline[3] - inset):
         drawing.holes += [Hole(x, y, HOLE_MM) for x in (left + inset, right - inset)]
     if skin.closed:
-        tube.check_tabs(skin, margin_mm)
         drawing.tab_mm = margin_mm
         drawing.holes += [Hole(right + inset, hole.y, HOLE_MM) for hole in drawing.holes[::2]]
+    tube.check(skin, drawing.tab_mm)
 
 
 def _fiducials(drawing: Drawing) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.design.sheet.caps import SCREW_MM
+from contactfpga.design.sheet.caps import SCREW_MM, turned
 from contactfpga.design.sheet.drawing import BOARDS
 from contactfpga.design.sheet.parts import SheetError
 from contactfpga.skin import Skin
@@ -24,25 +24,17 @@ PLATE_MM = 2.0
 """Thickness of a clamp's upper plate; the lower one fills :data:`ROOM_MM`."""
 STEP_MM = 0.5
 APART_MM = 12.0
-"""Distance of the plates in their file."""
+"""Distance of the plates in their file. A plate reaches 1 rad to either side at most (:func:`check`)."""
 
 
-def check(skin: Skin) -> None:
-    """Raise :class:`SheetError` for a radius that is too small for a flexible board."""
-    if skin.radius_mm is not None and skin.radius_mm < BEND * FLEX_MM:
-        raise SheetError(
-            f"radius_mm is {skin.radius_mm:g}; a flexible board of {FLEX_MM:g} mm with two layers takes "
-            f"{BEND * FLEX_MM:g} mm at least, {BEND} times its thickness (IPC-2223): set a larger radius_mm"
-        )
-
-
-def check_tabs(skin: Skin, tab_mm: float) -> None:
-    """Raise :class:`SheetError` for tabs so long that a clamp would reach around its tube."""
-    if skin.radius_mm is not None and tab_mm > skin.radius_mm:
-        raise SheetError(
-            f"radius_mm is {skin.radius_mm:g}; the tabs and clamps of a closed sheet are {tab_mm:g} mm long, as its "
-            "margin is wide, and need a radius of as much: set a larger radius_mm or a smaller --edge-mm"
-        )
+def check(skin: Skin, tab_mm: float) -> None:
+    """Raise :class:`SheetError` for a radius that is too small for a flexible board or for tabs of this length."""
+    least, why = max(
+        (BEND * FLEX_MM, f"{BEND} times the thickness of a flexible board (IPC-2223)"),
+        (tab_mm, "the length of the tabs and clamps over the seam, which --edge-mm sets"),
+    )
+    if skin.radius_mm is not None and skin.radius_mm < least:
+        raise SheetError(f"radius_mm is {skin.radius_mm:g}; it must be {least:g} or more, {why}")
 
 
 def tube_mm(skin: Skin) -> float:
@@ -68,35 +60,22 @@ def note(skin: Skin) -> str:
 
 def clamps(skin: Skin, tab_mm: float) -> np.ndarray:
     """Both clamps as (triangles, 3 corners, 3) in mm with outward normals: x along the sheet from its seam toward its
-    left end, y outward, z along the tube. The plates lie :data:`APART_MM` apart in y, lower ones first and third."""
-    radius, half = skin.radius_mm or 0.0, SCREW_MM / 2
-    screws = np.array([-tab_mm, tab_mm]) / 2
-    steps = np.arange(-tab_mm, tab_mm, STEP_MM)
-    around = np.unique(np.round([*steps, tab_mm, *(screws - half), *(screws + half)], 6))
-    along = np.array([0.0, tab_mm / 2 - half, tab_mm / 2 + half, tab_mm])
-    middles = (around[1:] + around[:-1]) / 2
-    hole = (np.abs(middles[:, None] - screws) < half).any(axis=1)
-    solid = {(i, j) for i, j in np.ndindex(len(hole), 3) if not (hole[i] and j == 1)}
+    left end, y outward, z along the tube. A plate is five bars that overlap around its screws' holes. The plates lie
+    :data:`APART_MM` apart in y, lower ones first and third."""
+    radius, end, screw, half = skin.radius_mm or 0.0, tab_mm, tab_mm / 2, SCREW_MM / 2
+    bars = [(-end, end, 0, screw - half), (-end, end, screw + half, end)]
+    bars += [(a, b, 0, end) for a, b in ((-end, -screw - half), (half - screw, screw - half), (screw + half, end))]
     lower = tube_mm(skin) / 2, radius - FLEX_MM / 2
     upper = radius + 1.5 * FLEX_MM, radius + 1.5 * FLEX_MM + PLATE_MM
-    angles = around / radius
-    found = []
-    for number, levels in enumerate((lower, upper, lower, upper)):
-        places = [np.column_stack([level * np.sin(angles), level * np.cos(angles)]) for level in levels]
-        quads = np.array(
-            [[(*places[k][i], along[j]) for i, j, k in quad] for cell in sorted(solid) for quad in _faces(cell, solid)]
-        )
-        found.append(np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) + (0, number * APART_MM, 0))
-    return np.concatenate(found)
+    plates = enumerate((lower, upper, lower, upper))
+    return np.concatenate(
+        [_bent(radius, *level, *bar) + (0, APART_MM * number, 0) for number, level in plates for bar in bars]
+    )
 
 
-def _faces(cell: tuple[int, int], solid: set[tuple[int, int]]) -> list[list[tuple[int, int, int]]]:
-    """Both faces of a plate's cell and its sides without a neighbor, as corners with their level, 0 or 1."""
-    i, j = cell
-    corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-    beside = [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)]
-    faces = [[(*one, 0) for one in corners], [(*one, 1) for one in corners[::-1]]]
-    for a, b, other in zip(corners, corners[1:] + corners[:1], beside, strict=True):
-        if other not in solid:
-            faces.append([(*a, 0), (*a, 1), (*b, 1), (*b, 0)])
-    return faces
+def _bent(radius: float, low: float, high: float, start: float, end: float, z: float, top: float) -> np.ndarray:
+    """A bar between the radii ``low`` and ``high``, from ``start`` to ``end`` along the sheet."""
+    half = np.array([high - low, top - z]) / 2
+    body = turned([(half, x) for x in np.linspace(start, end, 2 + int((end - start) / STEP_MM))])
+    away, along, angle = body[..., 0] + (low + high) / 2, body[..., 1] + (z + top) / 2, body[..., 2] / radius
+    return np.stack([away * np.sin(angle), away * np.cos(angle), along], axis=-1)
