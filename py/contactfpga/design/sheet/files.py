@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 import re
 import tomllib
 import zipfile
@@ -63,28 +64,34 @@ def packed(texts: Mapping[str, str]) -> bytes:
 
 def connectors_list(layout: Layout) -> str:
     """The :func:`connections` as CSV."""
-    rows = [(connector, *row) for connector, found in connections(layout).items() for row in found]
-    return orders.table([("connector", "pin", "wire", "line", "board"), *rows])
+    return orders.table(
+        [("connector", "pin", "wire", "line", "board"), *itertools.chain(*connections(layout).values())]
+    )
 
 
-def connections(layout: Layout) -> dict[str, list[tuple[str, str, str, str]]]:
-    """The pins of each connector of the sheet: number, wire as named by ``contactfpga build --wiring``, line, and for a
-    board with single wires its pin. There a ground that follows no line stays ``open``, and under "" are the wires to
-    other things, with their grounds."""
+def connections(layout: Layout) -> dict[str, list[tuple[str, ...]]]:
+    """The pins of each connector of the sheet, by its name: connector, number, wire as named by ``contactfpga build
+    --wiring``, line, and for a board with single wires its pin. There a ground that follows no line stays ``open``, and
+    under "" are the wires to other things, with their grounds."""
     board, ends = layout.board, {line.pin: line.net for line in layout.lines}
     wires = [wire for wire in wiring.wires(board, layout.skin) if wire.pin in board.printed] if board else []
     places = {wire.port: board.printed[wire.pin] for wire in wires if board}
     rails = {net: iter(pins) for net, pins in board.rails.items()} if board else {}
-    found: dict[str, list[tuple[str, str, str, str]]] = {}
+    found: dict[str, list[tuple[str, ...]]] = {}
     for one in (one for one in layout.drawing.placed if one.reference.startswith("J")):
-        before, rows = "", found.setdefault(one.reference, [])
+        before = ""
         for pin, net in one.nets.items():
             rail = rails.get(net, iter(())) if net != GND or before in ends else iter(())
-            rows.append((pin, net, ends.get(net, ""), places.pop(net, "") or next(rail, "open" if rails else "")))
+            place = places.pop(net, "") or next(rail, "open" if rails else "")
+            found.setdefault(one.reference, []).append((one.reference, pin, net, ends.get(net, ""), place))
             before = net
-    others = [("", wire.port, wire.line.leads_to, places[wire.port]) for wire in wires if wire.port in places]
-    others += [("", GND, "ground of these", place) for place in rails.get(GND, ())]
-    return found | ({"": others} if others else {})
+    others: list[tuple[str, ...]] = [
+        ("", "", wire.port, wire.line.leads_to, places[wire.port]) for wire in wires if wire.port in places
+    ]
+    others += [("", "", GND, "ground of these", place) for place in rails.get(GND, ())]
+    if others:
+        found[""] = others
+    return found
 
 
 def circuit_table(circuit: Circuit) -> str:

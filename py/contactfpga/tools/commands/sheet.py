@@ -119,14 +119,11 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     )
     if answer["wiring"]:
         terminal.say(
-            "wires: pin of the sheet, name, pin of the board by its print (GP, GN) or number; last, without the sheet"
+            "wires: pin of the sheet, name, pin of the board by its print or number; last, those without the sheet"
         )
-    columns = [
-        [f"{connector} {pin}".ljust(7 * bool(connector)) + f"{wire:12}{place:10}" for pin, wire, _, place in rows]
-        for connector, rows in answer["wiring"].items()
-    ]
-    for line in itertools.zip_longest(*columns, fillvalue=""):
-        terminal.say(f"  {''.join(line)}".rstrip())
+    for line in itertools.zip_longest(*answer["wiring"].values(), fillvalue=[""] * 5):
+        cells = (f"{connector:3}{pin:4}{wire:12}{place:10}" for connector, pin, wire, _, place in line)
+        terminal.say(f"  {''.join(cells)}".rstrip())
     found = answer["extracted"]
     terminal.say(
         "lines: rows {:.2f} to {:.2f} ohm, columns {:.2f} to {:.2f} ohm; a row to a column {:.2f} to {:.2f} pF, to the "

@@ -198,8 +198,8 @@ def parts_table() -> writer.Table:
 def wiring_table() -> str:
     """The single wires of the fast kit: its sheet's connectors side by side, then the wires without the sheet."""
     found = files.connections(kits.kit("fast").layout)
-    others = [("", f"`{wire}`: {leads_to}", place) for _, wire, leads_to, place in found.pop("")]
-    columns = [[(pin, f"`{wire}`", place) for pin, wire, _, place in rows] for rows in found.values()]
+    others = [("", f"`{wire}`: {leads_to}", place) for *_, wire, leads_to, place in found.pop("")]
+    columns = [[(pin, f"`{wire}`", place) for _, pin, wire, _, place in rows] for rows in found.values()]
     head = [cell for name in found for cell in (f"{name} of the sheet", "wire", "ULX3S")]
     lines = [[*itertools.chain(*line)] for line in zip(*columns, strict=True)]
     return writer.table_of([head, *lines, *([*one, "", "", ""] for one in others)])
