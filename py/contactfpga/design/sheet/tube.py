@@ -23,6 +23,7 @@ ROOM_MM = 2.0
 PLATE_MM = 2.0
 """Thickness of a clamp's upper plate; the lower one fills :data:`ROOM_MM`."""
 STEP_MM = 0.5
+"""Length of the flat pieces of which a plate's bent faces consist."""
 APART_MM = 12.0
 """Distance of the plates in their file. A plate reaches 1 rad to either side at most (:func:`check`)."""
 
@@ -38,7 +39,7 @@ def check(skin: Skin, tab_mm: float) -> None:
 
 
 def tube_mm(skin: Skin) -> float:
-    """Outer diameter of the tube of a closed sheet, whose middle is at ``radius_mm``."""
+    """Outer diameter of a closed sheet's tube; the middle of the sheet's thickness is at ``radius_mm``."""
     return 2 * ((skin.radius_mm or 0.0) - FLEX_MM / 2 - ROOM_MM)
 
 
