@@ -1,14 +1,17 @@
 """The wiring table of `contactfpga build`: every pin of the constraints once, and lines where they are soldered."""
 
 import collections
+import csv
 import itertools
 import json
 import re
 
 import pytest
+from amaranth_boards.ulx3s import ULX3S_12F_Platform
 from sample import sample
 
 from contactfpga.boards import BOARDS, wiring
+from contactfpga.design import kits
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import lay_out
 from contactfpga.tools import cli
@@ -125,6 +128,31 @@ def test_lines_are_pulled_to_the_level_that_they_have_untouched(changes, rows, c
     skin = BOARDS["ulx3s-85f"].skin.replace(**changes)
     assert {line.pull for line in wiring.row_lines(skin)} == {rows}
     assert {line.pull for line in wiring.column_lines(skin)} == {columns}
+
+
+def test_each_pin_of_the_fast_kits_sheet_leads_to_one_pin_of_the_ulx3s(tmp_path, capsys):
+    """No wire is missing, doubled or wrong. Power pins are copied from the ULX3S's schematic; signals are compared with
+    the constraints by the platform's pins."""
+    assert cli.main(["sheet", "--kit", "fast", "-o", str(tmp_path)]) == 0
+    said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    rows = list(csv.DictReader((tmp_path / "sheet-connectors.csv").read_text().splitlines()))
+    pins = [(row["connector"], row["pin"]) for row in rows if row["connector"]]
+    assert pins == [(name, str(pin)) for name in ("J1", "J2") for pin in range(1, 27)]
+    power = {"GND": {f"J{n} {pin}" for n in (1, 2) for pin in (3, 4, 21, 22, 37, 38)}, "3V3": {"J2 1", "J2 2"}}
+    kit = kits.kit("fast")
+    wanted, (gpio, *_) = constrained(kit.board, kit.skin), ULX3S_12F_Platform.connectors
+    found = {row["wire"]: row["board"] for row in rows if row["wire"] not in power}
+    assert found.keys() == wanted.keys() - {"clock", "held_high"}
+    for wire, place in found.items():
+        header, side, number = re.fullmatch(r"J(\d) G([PN])(\d+)", place).groups()
+        assert gpio.mapping[number + {"P": "+", "N": "-"}[side]] == wanted[wire]
+        assert int(header) == 1 + (int(number) >= 14)
+    used = [row["board"] for row in rows if row["board"] != "open"]
+    assert len(set(used)) == len(used)
+    assert all(row["board"] in {*power[row["wire"]], "open"} for row in rows if row["wire"] in power)
+    for number, (one, other) in enumerate(zip(rows[:26], rows[26:52], strict=True), 1):
+        words = f"J1 {number} {one['wire']} {one['board']} J2 {number} {other['wire']} {other['board']}"
+        assert any(line.startswith(words) for line in said)
 
 
 @pytest.fixture(autouse=True)

@@ -58,6 +58,16 @@ def test_a_sheet_on_a_bed_has_feet_as_wide_as_its_pads(tmp_path, skin):
     assert [foot.extents[0] for foot in feet] == pytest.approx([15.0] * 4)
 
 
+def test_a_sheet_around_a_tube_says_what_to_order_and_has_a_clamp(tmp_path, capsys):
+    assert cli.main(["sheet", str(examples() / "forearm.toml"), "-o", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "order a flex of 0.2 mm, for which this is 225 times its thickness (IPC-2223: at least 10)" in said
+    assert {path.name for path in tmp_path.iterdir()} == ALL - {"sheet-frame.stl"} | {"sheet-clamp.stl"}
+    note = zipfile.ZipFile(tmp_path / "sheet-board.zip").read("fabrication.txt").decode()
+    assert "289.74 x" in note  # 2 pi 45 and a tab of 7 mm
+    assert re.search(r"stiffeners: .* bottom, .* J1 40\.72 x 9\.2 at .*, J2 ", note)
+
+
 def test_text_says_the_same(tmp_path, skin, capsys):
     cli.main(["sheet", str(skin), "-o", str(tmp_path / "out"), "--json"])
     answer = json.loads(capsys.readouterr().out)

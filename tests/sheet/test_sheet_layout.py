@@ -4,14 +4,16 @@ import csv
 import io
 import itertools
 import math
+import re
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
 
 from contactfpga import Skin
 from contactfpga.design import kits
-from contactfpga.design.sheet import SheetError, files, lay_out
+from contactfpga.design.sheet import SheetError, files, gerber, lay_out, tube
 from contactfpga.design.sheet.caps import caps, feet, stl
 from contactfpga.design.sheet.parts import DOME, HC595, TACT, header
 
@@ -30,6 +32,11 @@ CLOSED = {"closed": True, "surface": "cylinder"}
         ({"pitch_y_mm": 5.0}, "dome", r"pitch_y_mm is 5; a cell with DOME_5MM_4LEG, .* needs 5\.2 mm"),
         ({"pitch_x_mm": 6.9}, "tact", r"pitch_x_mm is 6\.9; a cell with TACT_4\.5MM, .* needs 7 mm"),
         ({}, "spring", r"part is 'spring'; it must be one of dome, tact"),
+        (
+            {"columns": 2, "rows": 2, "pitch_x_mm": 5.6, "surface": "cylinder", "radius_mm": 1.9},
+            "dome",
+            r"radius_mm is 1\.9; it must be 2 or more, 10 times the thickness of a flexible board \(IPC-2223\)",
+        ),
         (dict(rows=20, columns=8, radius_mm=12.0, **CLOSED), "dome", r"rows is 20; .* place for at most 14 rows, 2"),
         (
             dict(rows=3, columns=4, row_drive="74hc595", column_read="74hc165", radius_mm=5.0, **CLOSED),
@@ -52,6 +59,38 @@ def test_a_closed_sheet_goes_on_over_its_seam():
     copper = [x for track in layout.drawing.tracks for x in (track.x1 - track.width / 2, track.x2 + track.width / 2)]
     assert min(copper) >= left + 0.3
     assert max(copper) <= right - 0.3
+
+
+@pytest.mark.parametrize("tab", [7.0, 12.0])
+def test_tabs_meet_over_the_seam_and_clamps_leave_room_for_tube_sheet_and_screws(tab):
+    """Angles and radii are those of a wrapped sheet, computed here; OpenCV and trimesh measure."""
+    layout = lay_out(Skin(rows=6, columns=12, radius_mm=30.0, row_drive="74hc595", **CLOSED), margin_mm=tab)
+    edge = gerber.files(layout.drawing, "a")["a-Edge_Cuts.gm1"]
+    starts = re.findall(r"X(-?\d+)Y(-?\d+)D02", edge)
+    board = np.array([(int(x) / 1e6, int(y) / 1e6) for x, y in starts], np.float32)
+    assert cv2.contourArea(board) == pytest.approx(2 * math.pi * 30.0 * board[:, 1].max() + 2 * tab**2, rel=1e-6)
+    places = [layout.drawing.corner(*one.spot(pad.x, pad.y)) for one in layout.drawing.placed for pad in one.part.pads]
+    assert min(cv2.pointPolygonTest(board, place, True) for place in places) > 0.6
+    holes = [layout.drawing.corner(hole.x, hole.y) for hole in layout.drawing.holes]
+    assert [cv2.pointPolygonTest(board, hole, True) for hole in holes] == pytest.approx([tab / 2] * 6, abs=1e-3)
+    angles = sorted({round((x / 30.0 + math.pi) % (2 * math.pi) - math.pi, 6) for x, _ in holes})
+    assert angles == pytest.approx([-tab / 60.0, tab / 60.0], abs=1e-5)
+    bars = sorted(printed(tube.clamps(layout.skin, tab)), key=lambda body: body.bounds[0, 1])
+    for number, (inside, outside) in enumerate([(30 - 2.1, 30 - 0.1), (30 + 0.3, 30 + 2.3)] * 2):
+        plate = trimesh.util.concatenate(bars[5 * number : 5 * number + 5])
+        plate.apply_translation((0, -12.0 * number, 0))
+        radii = np.hypot(plate.vertices[:, 0], plate.vertices[:, 1])
+        assert (radii.min(), radii.max()) == pytest.approx((inside, outside), abs=1e-3)
+        for angle, (away, hit) in itertools.product(angles, [(0, False), (1.65, False), (1.75, True), (3.4, True)]):
+            at = angle + np.array([-away, away, 0, 0]) / 30.0
+            rays = np.column_stack([np.sin(at), np.cos(at), np.zeros(4)])
+            starts = [(0, 0, tab / 2 + up) for up in (0, 0, -away, away)]
+            assert list(plate.ray.intersects_any(starts, rays)) == [hit] * 4
+
+
+def test_tabs_longer_than_the_radius_are_refused():
+    with pytest.raises(SheetError, match=r"radius_mm is 12; it must be 20 or more, .* tabs .* --edge-mm"):
+        lay_out(Skin(rows=6, columns=12, radius_mm=12.0, **CLOSED), margin_mm=20.0)
 
 
 def test_the_board_ends_half_a_pitch_and_its_margin_below_the_last_row_with_holes_in_the_margin():

@@ -113,7 +113,7 @@ def test_a_page_shows_the_pictures_that_its_study_draws(study, tmp_path):
 
 
 MOST_ROWS = 8
-READ_WHOLE = {"fields"}
+READ_WHOLE = {"fields", "wiring"}
 """A reader looks up any row of these."""
 
 

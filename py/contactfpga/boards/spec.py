@@ -103,6 +103,10 @@ class BoardSpec:
     """Table ``[circuit]`` of the default sheet."""
     uart: tuple[str, str] | None = None
     """Connector pins of an external bridge for receiving and sending; None for a bridge on the board."""
+    printed: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """Header of each pin and the print beside it, where wires are plugged one by one."""
+    rails: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
+    """Header and number of the pins for single wires of ``GND`` and ``3V3``."""
     held_high: tuple[str, ...] = ()
     """FPGA pins that other chips on the board need high."""
 

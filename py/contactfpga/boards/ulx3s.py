@@ -18,6 +18,18 @@ def _pairs(first: int, last: int) -> tuple[str, ...]:
     return tuple(f"gpio_0:{number}{sign}" for number in range(first, last + 1) for sign in "+-")
 
 
+# By gpio.sch (docs/boards.md). Both pins of a pair are on one rail, so the rails hold for either order of a header's
+# rows. J2 39 and 40 are 5 V, and J1's supply can be set to 2.5 V.
+_PRINTED = {
+    f"gpio_0:{number}{sign}": f"J{1 if number < 14 else 2} G{letter}{number}"
+    for number in range(28)
+    for sign, letter in ("+P", "-N")
+}
+_RAILS = {
+    "GND": tuple(f"J{header} {pin}" for pins in ((3, 4, 21, 22), (37, 38)) for header in (1, 2) for pin in pins),
+    "3V3": ("J2 1", "J2 2"),
+}
+
 ULX3S_12F = BoardSpec(
     name="ulx3s-12f",
     title="ULX3S 12F",
@@ -38,6 +50,8 @@ ULX3S_12F = BoardSpec(
     # 3 Mbaud is 4 % off at 25 MHz.
     skin=Skin(precharge_us=0.25, settle_us=2.0, release_us=0.5, clock_hz=25_000_000, baud=1_000_000),
     circuit={"series_ohm": 33.0, "line_pf": 50.0, "column_pull_ohm": 47_000.0},
+    printed=_PRINTED,
+    rails=_RAILS,
     held_high=("L2",),  # GPIO0 of the ESP32: low puts it into its boot loader
 )
 

@@ -130,6 +130,7 @@ _ALL = (
             kits=Section("tables:headline", page="../README.md"),
             counts=Section("tables:counts_table"),
             parts=Section("tables:parts_table", sample="tables:parts_table"),
+            wiring=Section("tables:wiring_table", sample="tables:wiring_table"),
             predictions=Section("tables:predictions_table", sample="tables:predictions_table"),
             tolerances=Section("tables:tolerances_table", sample="tables:tolerances_table"),
             sensitivity=Section("sensitivity:sensitivity_table"),

@@ -73,7 +73,7 @@ class Caps:
         outline = ((inner, 0), (inner, self.foot_mm), (stem, self.foot_mm), (stem, low), (half, low), (half, high))
         cells = [cell for cell in np.ndindex(self.skin.rows, self.skin.columns) if cell not in set(self.skin.mask)]
         webs = self._between(cells, half - OVERLAP_MM, wide, high - thick, high)
-        return np.concatenate([*self._at(_turned(outline), cells), *webs])
+        return np.concatenate([*self._at(turned(outline), cells), *webs])
 
     def frame(self) -> np.ndarray | None:
         """Tubes around the stems, joined by ribs, which stand on posts between the switches, and by a rim. None if no
@@ -87,12 +87,12 @@ class Caps:
         to_last = pitch * (skin.columns - 1, skin.rows - 1) / 2
         edge = to_last + pitch / 2
         outer, inner = edge + RIM_MM, to_last + tube - OVERLAP_MM
-        rim = _turned(
+        rim = turned(
             ((outer, board), (outer, rib), (inner, rib), (inner, low), (edge, low), (edge, board)), closed=True
         )
         return np.concatenate(
             [
-                *self._at(_turned(((tube, low), (tube, high), (hole, high), (hole, low)), closed=True), cells),
+                *self._at(turned(((tube, low), (tube, high), (hole, high), (hole, low)), closed=True), cells),
                 *self._between(cells, tube - OVERLAP_MM, WALL_MM, low, rib),
                 *self._between(cells, (min(pitch) - WALL_MM) / 2, WALL_MM, board, low + OVERLAP_MM),
                 rim + (to_last[0], -to_last[1], 0),
@@ -110,7 +110,7 @@ class Caps:
         for turn, pitch in enumerate((self.skin.pitch_x_mm, self.skin.pitch_y_mm)):
             half = np.roll((pitch / 2 - start, wide / 2), turn)
             first = [(row, column) for row, column in cells if (row + turn, column + 1 - turn) in set(cells)]
-            bar = _turned(((half, low), (half, high)))
+            bar = turned(((half, low), (half, high)))
             yield from self._at(bar + (*np.roll((pitch / 2, 0), turn) * (1, -1), 0), first)
 
 
@@ -133,7 +133,7 @@ def feet(pad_mm: float) -> np.ndarray:
     """Four feet of this side, each for a pad of the cover's bed, with a hole for the screw of a spacer."""
     half, hole, head = pad_mm / 2, SCREW_MM / 2, HEAD_MM / 2
     outline = ((half, 0), (half, FOOT_MM), (hole, FOOT_MM), (hole, SUNK_MM), (head, SUNK_MM), (head, 0))
-    return np.concatenate([_turned(outline, closed=True) + (number * (pad_mm + 2), 0, 0) for number in range(4)])
+    return np.concatenate([turned(outline, closed=True) + (number * (pad_mm + 2), 0, 0) for number in range(4)])
 
 
 def stl(corners: np.ndarray) -> bytes:
@@ -149,7 +149,7 @@ def stl(corners: np.ndarray) -> bytes:
 _SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
 
 
-def _turned(outline: Sequence[tuple[float | np.ndarray, float]], closed: bool = False) -> np.ndarray:
+def turned(outline: Sequence[tuple[float | np.ndarray, float]], closed: bool = False) -> np.ndarray:
     """A closed body around the z axis of rectangles with these half sides at these heights, from below; ``closed``: a
     ring, whose last rectangle joins the first."""
     levels = [np.column_stack([half * _SQUARE, np.full(4, z)]) for half, z in outline]

@@ -116,7 +116,9 @@ class Drawing:
         self.strokes: list[Stroke] = []
         self.holes: list[Hole] = []
         self.outline: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-        """Left, top, right and bottom edges."""
+        """Left, top, right and bottom edges without tabs."""
+        self.tab_mm = 0.0
+        """Length and width of the tabs at the right ends of the upper and lower margin; 0 for none."""
         self._counts: dict[str, int] = {}
 
     def place(
@@ -172,6 +174,18 @@ class Drawing:
     def corner(self, x: float, y: float) -> tuple[float, float]:
         """A place from the lower left corner of the board, y up, as files for a board house have it."""
         return rounded(x - self.outline[0]), rounded(self.outline[3] - y)
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom ends with tabs."""
+        left, top, right, bottom = self.outline
+        return left, top, right + self.tab_mm, bottom
+
+    def edge(self) -> list[tuple[float, float]]:
+        """Corners of the board, the first one again as the last."""
+        (left, top, right, bottom), tab = self.outline, self.tab_mm
+        notch = [(right + tab, top + tab), (right, top + tab), (right, bottom - tab), (right + tab, bottom - tab)]
+        ends = (right + tab, top), (right + tab, bottom)
+        return [(left, top), ends[0], *(notch if tab else ()), ends[1], (left, bottom), (left, top)]
 
     def nets(self) -> list[str]:
         found = {net for one in self.placed for net in one.nets.values()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 import re
 import tomllib
 import zipfile
@@ -11,10 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from contactfpga.boards import wiring
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet import gerber, kicad, orders, picture
+from contactfpga.design.sheet import gerber, kicad, orders, picture, tube
 from contactfpga.design.sheet.caps import Caps, feet, stl
-from contactfpga.design.sheet.drawing import BOARDS
+from contactfpga.design.sheet.drawing import BOARDS, GND
 from contactfpga.design.sheet.layout import Layout
 from contactfpga.design.sheet.parts import SheetError
 
@@ -42,6 +44,8 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str, pad_mm: floa
     }
     if (frame := caps.frame()) is not None:
         contents[f"{NAME}-frame.stl"] = stl(frame)
+    if skin.closed:
+        contents[f"{NAME}-clamp.stl"] = stl(tube.clamps(skin, drawing.tab_mm))
     if pad_mm is not None:
         contents[f"{NAME}-feet.stl"] = stl(feet(pad_mm))
     for name, content in contents.items():
@@ -59,11 +63,35 @@ def packed(texts: Mapping[str, str]) -> bytes:
 
 
 def connectors_list(layout: Layout) -> str:
-    """The connector list as CSV: the board wire of each pin, named as by ``contactfpga build --wiring``."""
-    plugs = [one for one in layout.drawing.placed if one.reference.startswith("J")]
-    ends = {line.pin: line.net for line in layout.lines}
-    rows = [(one.reference, pin, net, ends.get(net, "")) for one in plugs for pin, net in one.nets.items()]
-    return orders.table([("connector", "pin", "wire", "line"), *rows])
+    """The :func:`connections` as CSV."""
+    return orders.table(
+        [("connector", "pin", "wire", "line", "board"), *itertools.chain(*connections(layout).values())]
+    )
+
+
+def connections(layout: Layout) -> dict[str, list[tuple[str, ...]]]:
+    """The pins of each connector of the sheet, by its name: connector, number, wire as named by ``contactfpga build
+    --wiring``, line, and for a board with single wires its pin. There a ground that follows no line stays ``open``, and
+    under "" are the wires to other things, with their grounds."""
+    board, ends = layout.board, {line.pin: line.net for line in layout.lines}
+    wires = [wire for wire in wiring.wires(board, layout.skin) if wire.pin in board.printed] if board else []
+    places = {wire.port: board.printed[wire.pin] for wire in wires if board}
+    rails = {net: iter(pins) for net, pins in board.rails.items()} if board else {}
+    found: dict[str, list[tuple[str, ...]]] = {}
+    for one in (one for one in layout.drawing.placed if one.reference.startswith("J")):
+        before = ""
+        for pin, net in one.nets.items():
+            rail = rails.get(net, iter(())) if net != GND or before in ends else iter(())
+            place = places.pop(net, "") or next(rail, "open" if rails else "")
+            found.setdefault(one.reference, []).append((one.reference, pin, net, ends.get(net, ""), place))
+            before = net
+    others: list[tuple[str, ...]] = [
+        ("", "", wire.port, wire.line.leads_to, places[wire.port]) for wire in wires if wire.port in places
+    ]
+    others += [("", "", GND, "ground of these", place) for place in rails.get(GND, ())]
+    if others:
+        found[""] = others
+    return found
 
 
 def circuit_table(circuit: Circuit) -> str:

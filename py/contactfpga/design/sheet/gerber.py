@@ -110,9 +110,7 @@ class _Plot:
         return self
 
     def edge(self) -> _Plot:
-        left, top, right, bottom = self.drawing.outline
-        corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        for a, b in itertools.pairwise(corners):
+        for a, b in itertools.pairwise(self.drawing.edge()):
             self.line(EDGE_LINE_MM, *a, *b)
         return self
 

@@ -72,7 +72,7 @@ class _Writer:
     def board(self) -> Iterator[str]:
         yield "(kicad_pcb (version 20211014) (generator contactfpga)"
         yield _form("general", _form("thickness", self.thickness_mm))
-        left, top, right, bottom = self.drawing.outline
+        left, top, right, bottom = self.drawing.bounds()
         yield _form("paper", _text("User"), _mm(right - left + 2 * PAGE_MM), _mm(bottom - top + 2 * PAGE_MM))
         yield _form("title_block", _form("title", _text(self.title)))
         yield _form("layers", *(_form(number, _text(name), kind) for number, name, kind in _LAYERS))
@@ -137,9 +137,7 @@ class _Writer:
         for index, stroke in enumerate(self.drawing.strokes):
             layer = f"{stroke.layer}.SilkS"
             yield self._line((stroke.x1, stroke.y1), (stroke.x2, stroke.y2), layer, PRINT_MM, ("print", index))
-        left, top, right, bottom = self.drawing.outline
-        corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        for index, (a, b) in enumerate(itertools.pairwise(corners)):
+        for index, (a, b) in enumerate(itertools.pairwise(self.drawing.edge())):
             yield self._line(a, b, "Edge.Cuts", 0.1, ("edge", index))
         for index, hole in enumerate(self.drawing.holes, 1):
             name, size = f"H{index}", _mm(hole.drill)

@@ -14,7 +14,7 @@ from contactfpga import __version__
 from contactfpga.boards import wiring
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.design.circuit import Circuit
-from contactfpga.design.sheet import strip
+from contactfpga.design.sheet import strip, tube
 from contactfpga.design.sheet.drawing import (
     CLEARANCE_MM,
     EDGE_MM,
@@ -62,6 +62,7 @@ class Layout:
     drawing: Drawing
     lines: tuple[Line, ...]
     """Lines from left to right, as they leave the matrix."""
+    board: BoardSpec | None
 
 
 _FIDUCIAL_X = 6.5
@@ -77,8 +78,8 @@ def lay_out(
     board: BoardSpec | None = None,
 ) -> Layout:
     """Lay out the sheet of a Skin with the switch ``part``; with a ``board`` whose wires are all at PMOD sockets, its
-    headers have their order. Raises :class:`SheetError` for cells finer than their parts
-    and for lines without a place around a closed cylinder."""
+    headers have their order. Raises :class:`SheetError` for cells finer than their parts,
+    for a radius too small to bend to, and for lines or tabs without a place around a closed cylinder."""
     switch, fitted = find_switch(part), circuit or FITTED
     _check(skin, switch)
     matrix = _Matrix(skin, switch)
@@ -90,7 +91,7 @@ def lay_out(
     _outline(drawing, skin, (left, top, right), margin_mm)
     _fiducials(drawing)
     _print(drawing, skin, switch)
-    return Layout(skin, fitted, switch, drawing, tuple(lines))
+    return Layout(skin, fitted, switch, drawing, tuple(lines), board)
 
 
 def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
@@ -293,11 +294,15 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
     inset = margin_mm / 2
     for y in (drawing.outline[1] + inset, drawing.outline[3] - inset):
         drawing.holes += [Hole(x, y, HOLE_MM) for x in (left + inset, right - inset)]
+    if skin.closed:
+        drawing.tab_mm = margin_mm
+        drawing.holes += [Hole(right + inset, hole.y, HOLE_MM) for hole in drawing.holes[::2]]
+    tube.check(skin, drawing.tab_mm)
 
 
 def _fiducials(drawing: Drawing) -> None:
     """Three marks beside the holes of the back, on which an assembler's machine aligns itself."""
-    a, b, c, _ = drawing.holes
+    a, b, c, *_ = drawing.holes
     for hole, side in ((a, 1), (b, -1), (c, 1)):
         drawing.place("FID", FIDUCIAL, "", (hole.x + side * _FIDUCIAL_X, hole.y), {})
 

@@ -65,16 +65,28 @@ def note(layout: Layout) -> str:
 
 def _lines(layout: Layout) -> Iterator[tuple[str, str]]:
     skin, drawing = layout.skin, layout.drawing
-    left, top, right, bottom = drawing.outline
+    left, top, right, bottom = drawing.bounds()
     flex = skin.surface == "cylinder"
     yield "board", f"contactfpga {__version__}, sheet of {skin.rows}x{skin.columns} {skin.name}".rstrip()
-    yield "size", f"{right - left:.2f} x {bottom - top:.2f} mm, +-0.2 mm, a rectangle (Edge_Cuts)"
+    form = "a rectangle with two tabs" if skin.closed else "a rectangle"
+    yield "size", f"{right - left:.2f} x {bottom - top:.2f} mm, +-0.2 mm, {form} (Edge_Cuts)"
     yield "layers", "2: F_Cu on the top, B_Cu on the bottom; all data is seen from the top, with one origin"
     thickness = BOARDS[skin.surface][0]
     if flex:
         yield "material", f"polyimide flex, {thickness:g} mm with coverlay, 35 um of finished copper"
-        high = -skin.pitch_y_mm / 2 - top
-        yield "stiffener", f"FR-4 of 0.8 mm on the top, under the upper {high:.1f} mm, with the holes of the PTH file"
+        for letter, where in ("J", "bottom, with the holes of the PTH file"), ("U", "top"):
+            places = [
+                "{} {:g} x {:g} at {:.2f}, {:.2f}".format(
+                    one.reference, one.part.width, one.part.height, *drawing.corner(one.x, one.y)
+                )
+                for one in drawing.placed
+                if one.reference.startswith(letter)
+            ]
+            if places:
+                yield (
+                    "stiffeners",
+                    f"FR-4 of 0.8 mm on the {where}; mm, middles from the lower left: {', '.join(places)}",
+                )
     else:
         yield "material", f"FR-4, {thickness:g} mm, 35 um of finished copper"
     bare = not layout.switch.part.soldered

@@ -29,14 +29,14 @@ def svg(drawing: Drawing, title: str) -> str:
 
 
 def _lines(drawing: Drawing, title: str) -> Iterator[str]:
-    left, top, right, bottom = drawing.outline
+    left, top, right, bottom = drawing.bounds()
     edge = (right - left) / 50
     w, h = right - left + 2 * edge, bottom - top + 4 * edge
     yield f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w:.2f} {h:.2f}">'
     yield f"<title>{title}</title>"
     yield f'<path fill="{picture_style.CARD}" d="{_box(0, 0, w, h)}"/>'
     yield f'<g transform="translate({edge - left:.3f} {edge - top:.3f})">'
-    yield f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>'
+    yield f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_edge(drawing)}"/>'
     yield '<g fill="none" stroke-linecap="round">'
     for layer, (color, _) in COPPER.items():
         yield from _copper(drawing, layer, color)
@@ -52,7 +52,7 @@ def _lines(drawing: Drawing, title: str) -> Iterator[str]:
 def assembly(drawing: Drawing, title: str) -> str:
     """The text of an SVG file that shows the back as its assembler sees it: parts with references, first pins and
     cathodes; a user unit is a millimeter."""
-    left, top, right, bottom = drawing.outline
+    left, top, right, bottom = drawing.bounds()
     edge = (right - left) / 50
     back = [one for one in drawing.placed if one.back and one.part.soldered]
     lines = [
@@ -62,7 +62,7 @@ def assembly(drawing: Drawing, title: str) -> str:
         f'<path fill="#fff" d="{_box(0, 0, right - left + 2 * edge, bottom - top + 5 * edge)}"/>',
         f'<g transform="translate({right + edge:.3f} {edge - top:.3f}) scale(-1 1)" fill="none" '
         'stroke-linecap="round">',
-        f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_box(left, top, right - left, bottom - top)}"/>',
+        f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_edge(drawing)}"/>',
         *_pads(back),
         f'<path stroke="{_BODY}" stroke-width="0.15" d="{"".join(_body_of(one) for one in back)}"/>',
         *_dots([(hole.drill, hole.x, hole.y) for hole in drawing.holes], _HOLE),
@@ -142,6 +142,10 @@ def _path(lines: Sequence[CopperTrack | Stroke]) -> str:
 def _printed(drawing: Drawing, layer: Layer) -> str:
     strokes = [one for one in drawing.strokes if one.layer == layer]
     return f'<path stroke="{_PRINT}" stroke-width="{PRINT_MM}" d="{_path(strokes)}"/>'
+
+
+def _edge(drawing: Drawing) -> str:
+    return "M" + "L".join(f"{x:.2f} {y:.2f}" for x, y in drawing.edge()) + "z"
 
 
 def _box(x: float, y: float, w: float, h: float) -> str:

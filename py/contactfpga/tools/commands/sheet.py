@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import collections
 import dataclasses
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns 1 if KiCad was run and found something."""
-    from contactfpga.design.sheet import check, files, houses
+    from contactfpga.design.sheet import check, files, houses, tube
     from contactfpga.design.sheet.caps import caps
     from contactfpga.design.sheet.extract import extracted
 
@@ -57,14 +58,14 @@ def run(args: argparse.Namespace) -> int:
         check.require()
     names = files.write(folder, layout, layer, text, cover.bed.pad_mm if cover and cover.bed else None)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
-    left, top, right, bottom = layout.drawing.outline
+    left, top, right, bottom = layout.drawing.bounds()
     by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
-    large = "" if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
+    note = tube.note(skin) if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
     answer: dict[str, Any] = {
         "folder": str(folder),
         "files": names,
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
-        "note": large,
+        "note": note,
         "by_hand": collections.Counter(by_hand),
         "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
         "caps": {
@@ -74,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
             "plunger_mm": layer.switch.closed_by,
             "sinks_mm": layer.sinks_mm if f"{files.NAME}-frame.stl" in names else None,
         },
+        "wiring": files.connections(layout) if layout.board and layout.board.rails else {},
         "circuit": {
             name: getattr(found.circuit, name) for name in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm")
         },
@@ -107,13 +109,21 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     for words, count in answer["by_hand"].items():
         terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
     cap = answer["caps"]
-    sinks = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
-    framed = sinks if cap["sinks_mm"] else "without a frame, for which the switches are too close or the board too bent"
+    framed = "without a frame, for which the switches are too close or the board too bent"
+    if cap["sinks_mm"] is not None:
+        framed = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
     terminal.say(
         f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
         f"{cap['plunger_mm']:g} mm; {framed}",
         hang=2,
     )
+    if answer["wiring"]:
+        terminal.say(
+            "wires: pin of the sheet, name, pin of the board by its print or number; last, those without the sheet"
+        )
+    for line in itertools.zip_longest(*answer["wiring"].values(), fillvalue=[""] * 5):
+        cells = (f"{connector:3}{pin:4}{wire:12}{place:10}" for connector, pin, wire, _, place in line)
+        terminal.say(f"  {''.join(cells)}".rstrip())
     found = answer["extracted"]
     terminal.say(
         "lines: rows {:.2f} to {:.2f} ohm, columns {:.2f} to {:.2f} ohm; a row to a column {:.2f} to {:.2f} pF, to the "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import functools
+import itertools
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ from contactfpga.boards.wiring import ohms
 from contactfpga.design import kits, predictions
 from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
+from contactfpga.design.sheet import files
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, pnr_report
 from contactfpga_sim.apps import covers, pool
@@ -191,6 +193,16 @@ def parts_table() -> writer.Table:
     head = ("kit", "where", "count", "what", "value or maker's number")
     others = {row[2:] for row in rows if row[0] == NAMES[0]}
     return writer.Table(head, rows, lambda row: row[1] == "beside it" and row[2:] not in others, head[2:])
+
+
+def wiring_table() -> str:
+    """The single wires of the fast kit: its sheet's connectors side by side, then the wires without the sheet."""
+    found = files.connections(kits.kit("fast").layout)
+    others = [("", f"`{wire}`: {leads_to}", place) for *_, wire, leads_to, place in found.pop("")]
+    columns = [[(pin, f"`{wire}`", place) for _, pin, wire, _, place in rows] for rows in found.values()]
+    head = [cell for name in found for cell in (f"{name} of the sheet", "wire", "ULX3S")]
+    lines = [[*itertools.chain(*line)] for line in zip(*columns, strict=True)]
+    return writer.table_of([head, *lines, *([*one, "", "", ""] for one in others)])
 
 
 PREDICTED = ("contact_worst_us", "break_worst_us", "settle_us", "felt_half_n", "first_closing_ms", "closing_rod_n")
