@@ -38,7 +38,8 @@ skins = [
     small.replace(labeller="projection", guard=True, alive=True, units=3, converter="mcp3208"),
     small.replace(labeller="single", debounce="asym_eager_defer_pk", units=2, converter="ads131m08"),
     fast.replace(guard=True, self_test=True, labeller="serial", **round),
-    fast.replace(report="barycenter", send="on_change"),
+    fast.replace(report="barycenter", send="on_change", extent=True),
+    small.replace(guard=True, precharge_us=0.5, ruler=12),
     small.replace(report="cells", row_order=(2, 1, 0), baud=4_000_000),
 ]
 for skin in skins:
