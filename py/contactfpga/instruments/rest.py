@@ -18,7 +18,7 @@ NEVER = MAX_RULER + 1
 MARGIN = math.sqrt(2)
 """Ratio of the lowest rest level to the level that holds: half an octave of resistance."""
 HIGH = 2.0
-"""Ratio to the usual level below which a rest level is told: the cell is near to reading pressed without a touch."""
+"""A rest level below this multiple of the Skin's ``ruler`` is reported: the cell nearly reads pressed untouched."""
 STEP = 2 ** (1 / 16)
 """Most by which a frame changes a level."""
 NEAR = 2 ** (1 / 8)

@@ -45,9 +45,10 @@ class PlaceEstimate(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """Factors for zones of at least so many cells."""
+    """Factors for zones of a number of cells, up to the next row's number."""
 
     cells: int
+    """Least number of cells."""
     linear: float
     square: float
     place_mm2: float
@@ -119,7 +120,7 @@ class Places:
             raise PlacesError(f"the table of places is for {pitches}; fit one with contactfpga cover places")
 
     def of(self, growth: Growth, x_mm: float, y_mm: float, cells: int) -> PlaceEstimate:
-        """The place of a contact that grew to a zone of so many cells with this barycenter."""
+        """Place of a contact whose zone now has ``cells`` cells and the barycenter (``x_mm``, ``y_mm``)."""
         closings = growth.closings
         recorded = sum(one.closed.cells for one in closings)
         barycenter = PlaceEstimate(x_mm, y_mm, self._row(cells).barycenter_mm2, growth.moved)

@@ -133,7 +133,7 @@ class Tracker:
         """The contacts with their places by the order in which their cells closed."""
         sheet, before, found = self._sheet, self._growths, []
         assert sheet is not None
-        # Of a zone that parted nobody knows which cells went; one beside a zone that kept its cells is new.
+        # The cells that left a zone as it parted are not known. A zone beside one that kept its cells is new.
         areas = {track.id: track.zone.area_cells for track in active}
         parted = {
             name

@@ -260,7 +260,7 @@ def _is_inside(record: list[int], widths: Widths) -> bool:
 def _has_extent(record: list[int], scale: int, sheet: Sheet) -> bool:
     """Whether a zone with the barycenter (x, y) / ``scale`` may have its extent.
 
-    It is on the sheet, has a place for each cell, is not longer or wider than so many cells reach, and holds the
+    It is on the sheet, has a place for each cell, is no longer or wider than its cells can reach, and holds the
     barycenter.
     """
     area, x, y, *turned, left, right, top, bottom = record

@@ -96,9 +96,9 @@ and the true place, both from the barycenter in mm."""
 
 
 def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tuple[float, ...] = (1.0,)) -> Places:
-    """The table of a sheet, by so many simulated touches of each family. Raises CoverError for the model ``patch``.
+    """The table of a sheet, fitted to ``count`` simulated touches of each family.
 
-    ``levels``: closing forces of each cell over the switch's.
+    Raises CoverError for the model ``patch``. ``levels``: closing forces of each cell over the switch's.
     """
     skin = dataclasses.replace(skin, closed=False)
     grew = [one for family in FITTED for one in draws(family, skin, cover, count, seed, levels)]

@@ -129,7 +129,7 @@ def error_octaves(
 
 
 def sixteenths(circuit: Circuit, skin: Skin, ohm: float) -> int:
-    """``ruler`` of a Skin at which a cell of ``ohm`` usually just reads pressed; below 1 or above 255 there is none."""
+    """The Skin's ``ruler`` at which a cell of ``ohm`` usually just reads pressed. A board takes 1 to 255."""
     usual = fall_s(circuit, ohm, skin.row_lines)[0] / ruler_s(circuit, skin.row_lines, skin.columns)
     return round(float(min(usual * SIXTEENTHS, 1e6)))
 

@@ -51,7 +51,7 @@ class Diode:
         _check_limits("diode", self)
 
     def at(self, celsius: float) -> Diode:
-        """The same diode for formulas at 27 degrees Celsius, as it is at another temperature, by SPICE's law.
+        """The diode at another temperature, for formulas that assume 27 degrees Celsius, by SPICE's law.
 
         Band gap and exponent are those of silicon, 1.11 eV and 3, or for an emission below 1.3 of a Schottky diode,
         0.69 eV and 2.
