@@ -13,12 +13,20 @@ BODIES = ("forearm", "rigid")
 
 
 def headlines() -> list[list[str]]:
-    """The fields of each row of the README's table of figures: what, starter kit, fast kit, compared with what."""
+    """What, starter kit, fast kit and compared with what, of each row of the README's table of figures."""
     (section,) = re.findall(
         r"^## Simulated\n(.*?)^## ", (ROOT / "README.md").read_text(), flags=re.DOTALL | re.MULTILINE
     )
-    lines = [line for line in section.splitlines() if line.startswith("|")]
-    return [[field.strip() for field in line.strip("|").split("|")] for line in lines[2:]]
+    rows = re.findall(r"^\| (.*) \| (.*) \| (.*) \|$", section, re.MULTILINE)[1:]  # below the heading
+    return [[what, *of_kits(kits), against] for what, kits, against in rows]
+
+
+def of_kits(cell: str) -> list[str]:
+    """"starter A; fast B" or "both A" as [A, B]."""
+    if cell.startswith("both "):
+        return [cell.removeprefix("both ")] * 2
+    (both,) = re.findall(r"^starter (.*); fast (.*)$", cell)
+    return list(both)
 
 
 def line(page: str, start: str) -> list[str]:

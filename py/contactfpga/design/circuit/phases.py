@@ -20,7 +20,7 @@ NEAR_V = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Volts in the frame of :mod:`contactfpga.design.circuit.network` that surely read low and high."""
+    """Volts in the frame of :mod:`contactfpga.design.circuit.network` that are guaranteed to read as low and high."""
 
     low: float
     high: float

@@ -129,9 +129,9 @@ class Circuit:
     supply_v: float = field(default=3.3, metadata={"limits": (1.0, 5.5, "V")})
     """Supply of the board's pins."""
     low_v: float = field(default=0.8, metadata={"limits": (0.1, 5.0, "V")})
-    """VIL: the highest level that surely reads low."""
+    """VIL: the highest level that is guaranteed to read as low."""
     high_v: float = field(default=2.0, metadata={"limits": (0.2, 5.5, "V")})
-    """VIH: the lowest level that surely reads high."""
+    """VIH: the lowest level that is guaranteed to read as high."""
     pin_ma: float = field(default=8.0, metadata={"limits": (0.1, 100.0, "mA")})
     """Largest permanent pin current; 8 mA is specified for pins of an iCE40 at 3.3 V and of an ECP5 with its usual
     drive strength."""

@@ -6,7 +6,7 @@ import collections
 import functools
 import itertools
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -74,31 +74,39 @@ def headline(found: list[KitFigures]) -> str:
     paper = skin, covers.paper(skin.pitch_x_mm)
     *fingers, paper_fingers = (counts.share(rate) for rate in _rates(counts.FINGERS, paper))
     rows = [
-        ("", *(f"{one.kit.name} kit" for one in found), "compared with"),
+        ("", "kits", "compared with"),
         (
             "[Closed switch to the controller's decision](docs/kits.md#from-the-finger-to-your-code), over USB "
             "with 0.1 ms assumed for the host, worst / median",
-            *decision,
+            _of_kits(decision),
             "6,000 us for the paper's sheet and control together",
         ),
         (
             "[Closed switch to the last byte on the wire](docs/kits.md#from-the-finger-to-your-code), worst / median",
-            *byte,
+            _of_kits(byte),
             "up to 1,000 us until the next scan of a 1 kHz array",
         ),
         (
             "[Closed switch to the pin `contact`](docs/kits.md#from-the-finger-to-your-code), worst / median",
-            *pin,
+            _of_kits(pin),
             "the same",
         ),
         (
             f"[Scenes of {counts.FINGERS.name}](docs/kits.md#how-many-touches) miscounted, 95 % interval",
-            *(f"**{one}**" for one in fingers),
+            _of_kits(f"**{one}**" for one in fingers),
             f"{paper_fingers} with the paper's switch and foam at this pitch",
         ),
         *_peak_rows(found),
     ]
     return writer.table_of(rows)
+
+
+def _of_kits(values: Iterable[str]) -> str:
+    """What each kit has, in one cell, so that the table fits a phone."""
+    texts = tuple(values)
+    if len(set(texts)) == 1:
+        return f"both {texts[0]}"
+    return "; ".join(f"{name} {text}" for name, text in zip(NAMES, texts, strict=True))
 
 
 def _shown(one: KitFigures) -> tuple[str, str, str]:
@@ -132,8 +140,8 @@ def _peak_rows(found: list[KitFigures]) -> Iterator[tuple[str, ...]]:
         return ", ".join(f"{mark}{text} N{mark} {body}" for text, body in zip(texts, BODIES, strict=True))
 
     for way, what in PEAKS.items():
-        kits_n = (cell(one.kit.name, way, "**") for one in found)
-        yield f"[Peak force](docs/arm.md#the-kits) {what}", *kits_n, f"{cell('paper', way)} with the paper's sheet"
+        kits_n = _of_kits(cell(one.kit.name, way, "**") for one in found)
+        yield f"[Peak force](docs/arm.md#the-kits) {what}", kits_n, f"{cell('paper', way)} with the paper's sheet"
 
 
 def times_table(found: list[KitFigures]) -> writer.Table:

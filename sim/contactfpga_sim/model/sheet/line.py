@@ -19,7 +19,7 @@ class ColumnLine:
     """A column settles exponentially to its pressed or its released level.
 
     Levels are shares of the way from supply to ground. Both exponentials cross the threshold when the circuit's column
-    reaches its surely read level.
+    reaches the level that is guaranteed to be read.
     """
 
     press_s: tuple[float, ...]
