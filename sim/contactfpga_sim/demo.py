@@ -152,6 +152,11 @@ def _last_record(trace: Trace, skin: Skin) -> int | None:
     return window[-1] - end if window else None
 
 
+SHOWN = (
+    "Each scene touches a virtual sheet. The simulated gateware reads it clock by clock, and so does a plain Python model. "
+    "The verdict is whether each row, zone and byte was the same, in the same clock."
+)
+
 LEGEND = (
     "last record after last row: below 0 where all zones ended before the frame's last row.",
     'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
@@ -195,6 +200,7 @@ def main() -> int:
     scenes_run = [out for out in outcomes if out.engine == "compiled"]
     terminal.console().print(drawing.in_terminal(scenes_run, terminal.of().unicode))
     wrong = [out for out in outcomes if out.difference or out.frame is None]
+    terminal.say(SHOWN)
     styles = {number: "red" for number, out in enumerate(outcomes) if out in wrong}
     tables.show(rows_of(outcomes), keys=3, title=TITLE, texts=(VERDICT,), styles=styles)
     for line in LEGEND:

@@ -291,7 +291,6 @@ def test_a_click_in_a_browser_stops_the_arm():
     named = opening.ViewRequest(ROBOT, mujoco=SCENE, reflex=REFLEXES)
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         source = shown.source
-        browser.tidy(visitor)  # its notice covers the arm
         source.pace = pace = SteppedPace(0.0)
 
         def command():

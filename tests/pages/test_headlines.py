@@ -22,7 +22,7 @@ def headlines() -> list[list[str]]:
 
 
 def of_kits(cell: str) -> list[str]:
-    """"starter A; fast B" or "both A" as [A, B]."""
+    """[A, B] of "starter A; fast B", [A, A] of "both A"."""
     if cell.startswith("both "):
         return [cell.removeprefix("both ")] * 2
     (both,) = re.findall(r"^starter (.*); fast (.*)$", cell)

@@ -23,7 +23,6 @@ pytestmark = [
 def seen():
     # The window is small because the processor draws it.
     with opening.opened(http_port=0) as shown, browser.visit(shown, 800, 500) as visitor:
-        browser.tidy(visitor)
         yield shown, visitor
 
 
@@ -109,6 +108,20 @@ def test_a_picture_has_the_time_and_the_contacts_under_it(seen, tmp_path):
     assert shown.hand.fingers == []
 
 
+def test_keys_put_a_finger_down_and_move_it(seen):
+    shown, visitor = seen
+    sheet = shown.view.stage.tiles.sheet
+    keys = [*"lf", "Shift+ArrowRight", "Shift+ArrowDown", "Shift+ArrowDown", "Shift+ArrowUp"]
+    for key in keys:
+        visitor.page.keyboard.press(key)
+    visitor.page.wait_for_selector("text=1 contact")
+    (finger,) = shown.hand.fingers
+    assert finger.x_mm == (sheet.columns // 2 + 1) * sheet.pitch_x_mm
+    assert finger.y_mm == (sheet.rows // 2 + 1) * sheet.pitch_y_mm
+    visitor.page.keyboard.press("l")
+    visitor.page.wait_for_selector("text=Nothing touches")
+
+
 def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
     shown, visitor = seen
     places = [fitted(shown, visitor)[2]]
@@ -121,6 +134,7 @@ def test_keys_and_buttons_turn_the_view_and_it_is_fitted(seen):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_page_is_dark_for_who_likes_it(seen, scheme):
+    """Its tab has the project's name, and the library's notice of slow drawing leaves the sheet."""
     shown, visitor = seen
     page = visitor.page.context.browser.new_page(viewport={"width": 400, "height": 300}, color_scheme=scheme)
     page.set_default_timeout(1e3 * browser.PATIENCE_S)
@@ -129,6 +143,8 @@ def test_a_page_is_dark_for_who_likes_it(seen, scheme):
         page.wait_for_selector(f"html[data-mantine-color-scheme={scheme}]", state="attached")
         red, green, blue = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/[0-9]+/g).map(Number)")
         assert (red + green + blue < 150) == (scheme == "dark")
+        page.wait_for_function("document.title == 'contactfpga'")
+        page.wait_for_selector("text=Software WebGL rendering detected", state="detached")
     finally:
         page.close()
 

@@ -118,10 +118,12 @@ def _bars() -> Iterator[Callable[[str, int], None]]:
 class _Lines:
     def __init__(self) -> None:
         self._done: dict[str, int] = {}
-        self._said = time.monotonic()
+        self._began = self._said = time.monotonic()
 
     def __call__(self, name: str, of: int) -> None:
         self._done[name] = self._done.get(name, 0) + 1
         if time.monotonic() - self._said > LINE_S:
             self._said = time.monotonic()
-            print(f"{name}: {self._done[name]} of {of}", file=sys.stderr, flush=True)
+            done = self._done[name]
+            left_s = (self._said - self._began) * (of - done) / done
+            print(f"{name}: {done} of {of}, about {left_s:.0f} s left", file=sys.stderr, flush=True)

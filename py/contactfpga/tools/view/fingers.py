@@ -107,6 +107,16 @@ class Hand:
             self._stays.discard(who)
             self._tell()
 
+    def step(self, x_mm: float, y_mm: float) -> None:
+        """Move the finger that was put down last by this much."""
+        with self._lock:
+            if self._down:
+                last = self._down.pop()
+                x_mm = last.x_mm + x_mm
+                x_mm = x_mm if self._around_mm is None else x_mm % self._around_mm
+                self._down.append(dataclasses.replace(last, x_mm=x_mm, y_mm=last.y_mm + y_mm))
+                self._tell()
+
     def resize(self, radius_mm: float | None = None, force_n: float | None = None) -> None:
         """Resize all fingers, and future ones."""
         self.radius_mm = self.radius_mm if radius_mm is None else radius_mm

@@ -35,6 +35,12 @@ SCRIPT = """
   const style = document.createElement("style");
   style.textContent = STYLE;
   document.head.append(style);
+  document.title = "contactfpga";
+  setTimeout(() => {
+    for (const notice of document.querySelectorAll(".mantine-Notification-root"))
+      if (notice.textContent.includes("Software WebGL"))
+        notice.querySelector(".mantine-Notification-closeButton")?.click();
+  }, 3000);
   addEventListener("pointerdown", () => {
     window.__viserTestpoints?.devSettings.set({enableOrbitCrosshair: false});
     for (const one of window.__viserMutable?.scene?.children ?? [])
@@ -64,7 +70,8 @@ SCRIPT = """
   };
 })();
 """
-"""Script that moves viser's panel on phones, removes its own marks, and saves a picture with lines of text."""
+"""Script that names the tab, moves viser's panel on phones, removes its own marks, closes its notice of slow drawing,
+which covers the sheet, and saves a picture with lines of text."""
 
 
 def dress(server: viser.ViserServer) -> None:

@@ -39,6 +39,8 @@ TRUTH = (
 
 FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
 TITLE = 36
+STEPS: dict[str, tuple[int, int]] = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+"""Columns and rows by which a key moves a finger."""
 MOST_N = 30.0
 
 
@@ -74,6 +76,13 @@ class Panel:
             force.on_update(lambda _: hand.resize(force_n=force.value))
         lift.on_click(lambda _: hand.lift())
         server.gui.add_command("Lift all fingers", hotkey="L").on_trigger(lambda _: hand.lift())
+        middle_mm = (sheet.columns // 2 * sheet.pitch_x_mm, sheet.rows // 2 * sheet.pitch_y_mm)
+        finger = server.gui.add_command("Finger in the middle", hotkey="F")
+        finger.on_trigger(lambda _: hand.click(*middle_mm))
+        for key, (columns, rows) in STEPS.items():
+            step_mm = (columns * sheet.pitch_x_mm, rows * sheet.pitch_y_mm)
+            step = server.gui.add_command(f"Move the last finger: {key}", hotkey=f"arrow{key}", modifier="shift")
+            step.on_trigger(lambda _, step_mm=step_mm: hand.step(*step_mm))
 
     def _caption(self) -> tuple[str, list[contacts.Row]]:
         title = f"contactfpga: {shortened(self._source.title)}"

@@ -74,11 +74,13 @@ def _breaks(path: Path) -> Path:
             if sweep.broken is not None:
                 axes.plot([sweep.breaks_at], [amounts[sweep.broken]], "x", color=color, ms=7, mew=2)
                 axes.annotate(
-                    f"{sweep.breaks_at:,g}",
+                    f"{float(f'{sweep.breaks_at:.2g}'):,g}",
                     (sweep.breaks_at, amounts[sweep.broken]),
-                    (6, -14) if late else (5, 5),
+                    (6, -17) if late else (6, 7),
                     textcoords="offset points",
                     fontsize=style.SMALL,
+                    bbox={"facecolor": style.CARD, "edgecolor": "none", "pad": 1},
+                    zorder=5,
                 )
         words = f"limit, settle_us = {limit:g} µs" if late else f"limit, VIH = {limit:.1f} V"
         axes.axhline(limit, color=style.INK, lw=1, ls=style.DASHES[1], label=words)

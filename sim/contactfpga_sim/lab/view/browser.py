@@ -74,6 +74,7 @@ class Visitor:
                 raise TimeoutError("the page never said where its camera is")
             page.wait_for_timeout(50)
         page.evaluate(WATCH)
+        page.wait_for_selector("text=Software WebGL rendering detected", state="detached")  # it covers cells at first
         page.wait_for_timeout(500)
 
     def place(self, x_mm: float, y_mm: float, link: str = "") -> tuple[float, float]:
@@ -189,10 +190,3 @@ def running(shown: ServedView) -> Iterator[None]:
         thread.join()
     if failed:
         raise failed[0]
-
-
-def tidy(visitor: Visitor) -> None:
-    """Close the notice on rendering by the processor."""
-    if visitor.page.locator("text=Software WebGL rendering detected").count():
-        visitor.page.locator("button.mantine-Notification-closeButton").first.click()
-        visitor.page.wait_for_timeout(500)

@@ -103,7 +103,6 @@ def clicks(shown: ServedView, visitor: browser.Visitor, count: int = CLICKS) -> 
     """Click cells in turn, and lift the finger in between."""
     sheet, found = sheet_of(shown), []
     assert shown.hand is not None
-    browser.tidy(visitor)  # it lies over cells
     for index in range(count):
         row, column = 2 + 5 * index % (sheet.rows - 4), 2 + 7 * index % (sheet.columns - 4)
         place = column * sheet.pitch_x_mm, row * sheet.pitch_y_mm
