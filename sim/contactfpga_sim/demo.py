@@ -153,8 +153,8 @@ def _last_record(trace: Trace, skin: Skin) -> int | None:
 
 
 SHOWN = (
-    "Each scene touches a virtual sheet. The simulated gateware reads it clock by clock, and so does a plain Python model. "
-    "The verdict is whether each row, zone and byte was the same, in the same clock."
+    "Each scene touches a virtual sheet. The simulated gateware reads it clock by clock, and so does a plain Python "
+    "model. The verdict is whether each row, zone and byte was the same, in the same clock."
 )
 
 LEGEND = (
