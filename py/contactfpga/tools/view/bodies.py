@@ -108,7 +108,7 @@ class DrawnRobot:
     ) -> list[contacts.Row]:
         """Draw a link's newest frame; returns its contacts. ``truth``: (rows, columns) closed switches, if known;
         ``arrows``: (n, 2, 3) forces in m in the sheet's frame, replacing those that units measure; ``label``: the
-        link's name in the contacts' rows.
+        link's name at its contacts and in their rows.
         """
         stage, plan = self.stage.stages[name], self._links[name]
         if state.zones is None:
@@ -119,8 +119,9 @@ class DrawnRobot:
         if arrows is None and felt is not None:
             arrows = pushes(plan, felt)
         moment = Moment(state.zones, self._trackers[name].update(state.zones), truth, pushes=pushed, arrows=arrows)
-        stage.draw(moment)
-        return contacts.rows(moment, name if label is None else label)
+        named = name if label is None else label
+        stage.draw(moment, named)
+        return contacts.rows(moment, named)
 
     def _measured(self, plan: Plan, newest: LinkState) -> list[LinkContact] | None:
         """The newest contacts, of the previous frame until readings arrive."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,8 @@ NODE = "/sheet"
 FILLED = 0.86
 THICK = 0.08
 LABELS = 24
+ANCHORS: tuple[Any, ...] = ("bottom-left", "top-right", "bottom-right", "top-left")
+"""Corners of the labels at their contacts, in turn, so that those of neighbors lie apart."""
 
 BOX = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-1.0, 0.0)])
 FACES = np.array(
@@ -88,8 +91,8 @@ class Stage:
         points, _ = tiles.surface.place(*(each.ravel() for each in np.broadcast_arrays(x, y)))
         return np.concatenate([points, tiles.points_mm]) * MM
 
-    def draw(self, moment: Moment) -> None:
-        """Draw a moment, sending only changes."""
+    def draw(self, moment: Moment, link: str = "") -> None:
+        """Draw a moment, sending only changes; ``link``: name of the robot's link, for the labels."""
         zones = moment.zones
         self._color(picture.tile_colors(zones, moment.truth))
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
@@ -98,7 +101,7 @@ class Stage:
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
-        self._draw_labels(moment)
+        self._draw_labels(contacts.rows(moment, link))
         self._draw_arrows(self._forces(moment))
 
     def draw_no_data(self, arrows: np.ndarray | None = None) -> None:
@@ -166,11 +169,12 @@ class Stage:
             precision="float32",
         )
 
-    def _draw_labels(self, moment: Moment) -> None:
-        shown = [row for row in contacts.rows(moment) if row.id is not None and row.x_mm is not None][:LABELS]
+    def _draw_labels(self, rows: Sequence[contacts.Row]) -> None:
+        shown = [row for row in rows if row.id is not None and row.x_mm is not None][:LABELS]
         while len(self._labels) < len(shown):
             path = f"{self._node}/contact{len(self._labels)}"
-            self._labels.append(self._server.scene.add_label(path, "", anchor="bottom-left", font_screen_scale=0.8))
+            anchor = ANCHORS[len(self._labels) % len(ANCHORS)]
+            self._labels.append(self._server.scene.add_label(path, "", anchor=anchor, font_screen_scale=0.8))
         for number, (label, row) in enumerate(zip(self._labels, shown)):
             assert row.x_mm is not None
             assert row.y_mm is not None
