@@ -94,7 +94,9 @@ at("faults").addEventListener("click", ({ target }) => {
   const kind = target.dataset.fault;
   if (!kind) return;
   broken[kind] = broken[kind] ? null : { kind, row: line("row"), column: line("column") };
-  target.setAttribute("aria-pressed", String(Boolean(broken[kind])));
+  target.classList.toggle("broken", Boolean(broken[kind]));
+  target.dataset.breaks ??= target.textContent;
+  target.textContent = broken[kind] ? target.dataset.mends : target.dataset.breaks;
   const { row, column, short } = broken;
   machine.board.cut(row ? [[row.row, row.column]] : [], column ? [[column.column, column.row]] : []);
   machine.board.stick(short ? [short.column] : []);

@@ -59,7 +59,7 @@ const SAYS = {
 
 // What the board reports of its lines, and what was broken: cuts, and whether a switch is jammed.
 export function showReport(faults, cuts, jammed) {
-  const said = faults.map((fault) => `The board reports: ${fault}.`);
+  const said = faults.length ? [`The board reports: ${faults.join("; ")}.`] : [];
   if (jammed) said.push("The jammed switch reads as a touch: the board cannot tell it from a finger.");
   at("report").textContent = said.join(" ") || "The board reports: all lines are whole.";
   at("report").classList.toggle("bad", said.length > 0);
