@@ -155,8 +155,8 @@ _TOOTH_MM = 0.25
 """Width of a comb's teeth, and of the gaps between them."""
 _GAP_PF_MM = 0.037
 """Capacitance per length of a gap, by :func:`contactfpga.design.sheet.extract.beside_pf` on FR-4."""
-_COMB_VIA_Y, _COMB_HOLE_MM = -1.0, 0.6
-"""Place of the via on a tooth of the second comb, and half of what teeth leave free there."""
+_COMB_HOLE_MM = 0.6
+"""Half of what teeth leave free around the via in the middle."""
 
 
 def comb(pitch_x_mm: float, pitch_y_mm: float) -> SwitchPart:
@@ -174,7 +174,7 @@ def comb(pitch_x_mm: float, pitch_y_mm: float) -> SwitchPart:
     ]
     for number in range(-last, last + 1):
         y = number * step
-        free = -_COMB_HOLE_MM if abs(y - _COMB_VIA_Y) < 1.5 * step else half - step
+        free = -_COMB_HOLE_MM if abs(y) < 1.5 * step else half - step
         side, left, right = ("1", -half, free) if number % 2 else ("2", -free, half)
         pads.append(Pad(side, (left + right) / 2, y, right - left, _TOOTH_MM))
     name = f"COMBS_{2 * half:.2f}x{2 * reach + _TOOTH_MM:.2f}MM"
@@ -187,8 +187,8 @@ def comb(pitch_x_mm: float, pitch_y_mm: float) -> SwitchPart:
         height_mm=0.1,
         closed_by=2 * half,
         column=tuple((*a, *b) for a, b in itertools.pairwise(column)),
-        diode=((spine, _COMB_VIA_Y, 0.0, _COMB_VIA_Y),),
-        via=(0.0, _COMB_VIA_Y),
+        diode=((spine, 0.0, 0.0, 0.0),),
+        via=(0.0, 0.0),
         tail=0,
         reach=reach,
         half_width=half,

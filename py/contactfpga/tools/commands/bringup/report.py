@@ -15,6 +15,7 @@ from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup.bench import Step
+from contactfpga.tools.commands.bringup.film import Film
 
 NOT_FITTED = (
     "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a rod of 4 mm on the "
@@ -59,6 +60,7 @@ class BringUpReport:
         self.not_measured: list[Prediction] = []
         self.fitted: FittedCircuit | None = None
         self.force: FittedForce | None = None
+        self.film: Film | None = None
 
     @property
     def faults(self) -> int:
@@ -95,6 +97,7 @@ class BringUpReport:
             ],
             "circuit": {one.name: {"value": one.value, "low": one.low, "high": one.high} for one in self._circuit()},
             "switch_force_n": None if self.force is None else dataclasses.asdict(self.force),
+            "cell": [one._asdict() for one in self.film.values] if self.film else [],
         }
 
     def _circuit(self) -> list[FittedValue]:
@@ -132,6 +135,9 @@ class BringUpReport:
         rows = [("circuit", one.name, one.value, one.low, one.high) for one in self._circuit()]
         if self.force is not None:
             rows.append(("cover.switch", "force_n", self.force.value, self.force.low, self.force.high))
+        if self.film is not None:
+            yield "\nThe CSV file beside this report has the factor of each cell's resistance."
+            rows += [("cover.cell", *one) for one in self.film.values]
         if rows:
             yield f"\n## Fitted\n\nThe intervals are computed to hold together with {100 * PROBABILITY:.0f} %."
             yield "docs/bringup.md says how often they did.\n\n```toml"
@@ -140,7 +146,7 @@ class BringUpReport:
                 for _, name, value, low, high in (row for row in rows if row[0] == table):
                     yield f"{name} = {value:.4g}    # {low:.4g} to {high:.4g}"
             yield "```"
-        if self.force is None:
+        if self.force is None and not self.kit.skin.ruler:
             yield f"\n{NOT_FITTED}"
 
 
