@@ -24,7 +24,7 @@ SKINS = {
     "finest tact": (Skin(rows=4, columns=6, pitch_x_mm=7.0, pitch_y_mm=5.8, guard=True), "tact"),
     "combs": (Skin(rows=9, columns=7, guard=True, precharge_us=1, ruler=31, **TILE), "combs"),
     "finest combs": (
-        Skin(rows=4, columns=6, guard=True, precharge_us=1, ruler=31, pitch_x_mm=5.2, pitch_y_mm=4.4),
+        Skin(rows=4, columns=6, guard=True, precharge_us=1, ruler=31, pitch_x_mm=5.2, pitch_y_mm=5.2),
         "combs",
     ),
     "coarse combs": (Skin(rows=3, columns=4, guard=True, precharge_us=1, ruler=31), "combs"),

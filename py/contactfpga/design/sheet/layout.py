@@ -59,6 +59,8 @@ _GUARD_ROW_Y, _RULER_Y = 4.2, 2.7
 """Distance of the guard row from the last row, and what the ruler's resistors add to it."""
 _GUARD_VIA = 0.0, -0.6
 _GUARD_DIODE_X, _RULER_X = -0.35, 1.2
+_RULED_MM = 5.2
+"""Height that a guard column's diode takes with its print."""
 _GUARD_EDGE = 0.7
 """Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
 
@@ -118,6 +120,8 @@ def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
     wide = switch.part.width + CLEARANCE_MM
     cell = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - switch.via[1] + VIA_MM / 2
     high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, cell)
+    if skin.ruler:
+        high = max(high, _RULED_MM)
     if skin.columns > 1:
         wide = max(wide, 2 * switch.half_width + VIA_MM + 2 * CLEARANCE_MM, 2 * PLACE_MM)
     if skin.closed and skin.guard:

@@ -1,0 +1,161 @@
+"""The soft kit beside the starter kit, row by row; tables of docs/soft.md."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.design import kits
+from contactfpga.design.circuit import falling
+from contactfpga.design.cover import Cover, ResistiveCell, load_cover
+from contactfpga.design.cover.cells import cells_of
+from contactfpga.design.kits import Kit
+from contactfpga.design.sheet.extract import extracted
+from contactfpga_sim.apps import errors, pool, result_cache
+from contactfpga_sim.apps.stats import Interval, interval
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.kits import predict
+from contactfpga_sim.lab.levels.compute import FAMILIES, OLDER, TOUCHED, Outcome, Reading, Sensed, outcome
+from contactfpga_sim.lab.levels.pressed import Pressed
+from contactfpga_sim.model.scenes.families import placements
+
+SCENES, PIECE, SEED = 400, 50, 3
+SETUP_USD, JOINT_USD = 9.5, 0.0017
+"""JLCPCB's tariff for an assembly, with a stencil (docs/starter.md)."""
+LEAKS_UA = 10.0, 1.0, 0.1
+
+
+class Sheet(NamedTuple):
+    """A kit, and the forces of its cells' levels."""
+
+    name: str
+    kit: str
+    reading: Reading
+
+    @property
+    def cover(self) -> Cover:
+        """The kit's own; a resistive cell's level is the lightest."""
+        stated = load_cover(kits.kit(self.kit).skin_path)
+        assert stated is not None
+        if stated.cell is None:
+            return stated
+        cell = dataclasses.replace(stated.cell, level_n=self.reading.forces_n[0])
+        return dataclasses.replace(stated, cell=cell, switch=cell.switch)
+
+
+SHEETS = (
+    Sheet("starter", "starter", Reading((0.4,))),
+    Sheet("soft, one level", "soft", Reading((0.2,))),
+    Sheet("soft, three levels", "soft", Reading((0.1, 0.4, 1.6), 2)),
+)
+
+
+class Film(Sensed):
+    """Forces on cells of the film, as :class:`Sensed` has those of any cell."""
+
+    def __init__(self, forces_n: np.ndarray, cell: ResistiveCell, *seeds: int):
+        rng, creep = np.random.default_rng(seeds), cell.creep / cell.exponent
+        gain = np.exp(cell.spread / cell.exponent * rng.standard_normal(forces_n.shape))
+        preload = cell.preload_n * np.abs(rng.standard_normal(forces_n.shape))
+        self._rest_n = gain * preload
+        touch, older = 1 + creep * rng.uniform(*TOUCHED), 1 + creep * rng.uniform(0, OLDER)
+        self._touched_n = gain * (np.maximum(forces_n, 0) * touch + preload * older)
+
+
+class Domes(NamedTuple):
+    """Closed domes, which have one level whatever the reading."""
+
+    closed: np.ndarray
+
+    def levels(self, reading: Reading) -> np.ndarray:
+        return self.closed.astype(int)
+
+
+def _piece(sheet: Sheet, family: str, first: int) -> list[Outcome]:
+    def new() -> list[Outcome]:
+        return [*_outcomes(sheet, family, first)]
+
+    key = f"{result_cache.made_by(__name__, kits.kit(sheet.kit).skin)} {sheet} {sheet.cover} {family} {first} {SEED}"
+    return [Outcome(*one) for one in result_cache.cached("soft", key, new)]
+
+
+def _outcomes(sheet: Sheet, family: str, first: int) -> Iterator[Outcome]:
+    skin, cover = kits.kit(sheet.kit).skin, sheet.cover
+    pitch_m = 1e-3 * skin.pitch_x_mm
+    for number, drawn in enumerate(placements(family, PIECE, SEED, skin, first), first):
+        on = drawn.on_cover(skin, cover)
+        loads, there = on.loads(0.0), errors.contacts(on.truth(0.0, skin))
+        cells = cells_of(cover, skin.rows, skin.columns, pitch_m, pitch_m, number)
+        forces_n = cells.forces_n(loads)
+        read = Film(forces_n, cover.cell, SEED, number) if cover.cell else Domes(cells.closed_by(forces_n))
+        yield outcome(read, sheet.reading, Pressed(forces_n, there, there), skin)  # type: ignore[arg-type]
+
+
+def _judged(sheet: Sheet, family: str, workers: Executor) -> tuple[Interval, Interval]:
+    """Shares of wrong counts, and errors of place in mm."""
+    pieces = workers.map(functools.partial(_piece, sheet, family), range(0, SCENES, PIECE))
+    found = [one for piece in pieces for one in piece]
+    return interval([float(one.wrong) for one in found]), interval([one.place_mm for one in found])
+
+
+def verdict_table() -> writer.Table:
+    """What both kits come to; the last column names the soft sheets that are better, beyond intervals if there are
+    any."""
+    rows: list[tuple[str, ...]] = []
+    with pool.executor() as workers:
+        judged = {(one, family): _judged(one, family, workers) for one in SHEETS for family in FAMILIES}
+    felt = [predict.measured(predict.pressing(one.cover, {"spread": 0.0}), kits.kit(one.kit).skin, 0) for one in SHEETS]
+    for name, what, unit in (
+        ("felt_half_n", "half of fingers felt from", "N"),
+        ("first_closing_ms", "foam touched at 150 mm/s until felt", "ms"),
+    ):
+        values = [one[name] for one in felt]
+        rows.append((what, *(f"{value:.2g} {unit}" for value in values), _better([(one, one) for one in values])))
+    for number, (what, scale, unit) in enumerate((("counted wrong", 100, "%"), ("place off by", 1, "mm"))):
+        for family in FAMILIES:
+            spans = [judged[one, family][number] for one in SHEETS]
+            cells = (
+                f"{scale * s.mean:.{2 - number}g} {unit} ({scale * s.low:.2g} to {scale * s.high:.2g})" for s in spans
+            )
+            rows.append((f"{family} {what}", *cells, _better([(one.low, one.high) for one in spans])))
+    soldered = [joints(kits.kit(one.kit)) for one in SHEETS]
+    prices = [SETUP_USD + JOINT_USD * count for count in soldered]
+    assembled = (f"{count} joints, {usd:.2f} USD" for count, usd in zip(soldered, prices, strict=True))
+    rows.append(("assembly without parts", *assembled, _better([(usd, usd) for usd in prices])))
+    return writer.Table(("what", *(one.name for one in SHEETS), "better"), rows)
+
+
+def _better(spans: list[tuple[float, float]]) -> str:
+    names = [one.name.partition(", ")[2] for one, (_, high) in zip(SHEETS, spans, strict=True) if high < spans[0][0]]
+    return ", ".join(names) or "no"
+
+
+def joints(kit: Kit) -> int:
+    """Joints that an assembler solders; headers with pins through the board are soldered by hand."""
+    pads = [pad for one in kit.layout.drawing.placed if one.part.soldered for pad in one.part.pads]
+    return sum(not pad.drill for pad in pads)
+
+
+def leakage_table() -> str:
+    """The largest error of a level by the pins' leakage, at the corners of docs/cell.md."""
+    kit, cover = kits.kit("soft"), load_cover(kits.kit("soft").skin_path)
+    assert cover is not None
+    assert cover.cell is not None
+    circuit, forces_n = (
+        extracted(kit.layout).circuit,
+        sorted({force for one in SHEETS[1:] for force in one.reading.forces_n}),
+    )
+    ohm = cover.cell.ohm(np.array(forces_n))
+    rows = [
+        ["leakage of a pin", *(f"{force:g} N, {each / 1e3:.3g} kΩ" for force, each in zip(forces_n, ohm, strict=True))]
+    ]
+    for leak in LEAKS_UA:
+        octaves = falling.error_octaves(circuit, kit.skin.row_lines, kit.skin.columns, ohm, leak)
+        rows.append([f"{leak:g} µA", *(f"{one:.2f}" if math.isfinite(one) else "never read" for one in octaves)])
+    return writer.table_of(rows)
