@@ -210,7 +210,7 @@ def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
     values = {name: getattr(circuit, name) * factor for name, factor in factors.items()}
     if circuit.falling is not None:
         parts = {name: getattr(circuit.falling, name) * one.drawn(rng) for name, one in FALLING.items()}
-        values["falling"] = dataclasses.replace(circuit.falling, **parts)
+        values |= {"falling": dataclasses.replace(circuit.falling, **parts), "column_pull_ohm": circuit.column_pull_ohm}
     return circuit.replace(diode=dataclasses.replace(circuit.diode, **diode), **values)
 
 
@@ -257,7 +257,7 @@ def _falling(kit: Kit, drawn: list[Circuit], rng: np.random.Generator) -> Iterat
     found = []
     for number, (one, us) in enumerate(zip(drawn, ruler_us, strict=True)):
         leak_a = 1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (number > 0)
-        found.append(float(falling.read_ohm(one, lines[0], 1e-6 * later * us, Corner(leak_a=leak_a))[0]))
+        found.append(float(falling.read_ohm(one, lines[0], 1e-6 * later * us, Corner(leak_a=leak_a))))
     what = "the largest resistor in a cell's place that reads pressed, alone"
     yield _made("level_ohm", what, found, "circuit", here)
 
