@@ -32,16 +32,16 @@ def extracted() -> Circuit:
 @pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
 @pytest.mark.parametrize(("celsius", "supply_v"), [(-20.0, 3.0), (27.0, 3.3), (70.0, 3.6)])
 def test_the_soft_kit_reads_its_level_at_the_corners_in_ngspice(celsius, supply_v):
-    """On its own lines, whole sheet pressed but for one cell: at the ruler's multiple a resistance within 0.3 octaves
-    of the level's is what has just fallen to the pin's threshold, which follows the supply."""
+    """On its own lines: the ruler's multiple lies between the times of cells 0.3 octaves from the level's resistance, at
+    a threshold that follows the supply."""
     kit, cell = kits.kit("soft"), load_cover(kits.kit("soft").skin_path).cell
     circuit = extract.extracted(kit.layout).circuit.replace(supply_v=supply_v)
     lines, at_v = (kit.skin.row_lines, kit.skin.columns), circuit.falling.threshold_v * supply_v / 3.3
     fallen_s = []
     for ohm in (circuit.falling.ruler_ohm, cell.level_ohm / 2**0.3, cell.level_ohm * 2**0.3):
-        cells = np.full(lines, np.inf)
-        cells[ROW] = ohm if not fallen_s else np.inf  # the ruler's columns fall together
-        cells[ROW, 3] = ohm
+        cells, row = np.full(lines, np.inf), lines[0] // 2
+        cells[row] = ohm if not fallen_s else np.inf  # the ruler's columns fall together
+        cells[row, 3] = ohm
         phase = phases.settle(Network(circuit, np.isfinite(cells), ohm=cells), Levels.of(circuit))
         seconds, volts = agreement.run(phase, 60e-6, 6000, celsius)
         fallen_s.append(float(np.interp(-at_v, -volts[:, 3], seconds)))

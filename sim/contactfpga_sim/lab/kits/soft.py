@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design import kits
+from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import falling
 from contactfpga.design.cover import Cover, ResistiveCell, load_cover
 from contactfpga.design.cover.cells import cells_of
@@ -117,6 +117,9 @@ def verdict_table() -> writer.Table:
     ):
         values = [one[name] for one in felt]
         rows.append((what, *(f"{value:.2g} {unit}" for value in values), _better([(one, one) for one in values])))
+    last = [1e-3 * predictions.load(kits.kit(one.kit))["last_byte_worst_us"].value for one in SHEETS[:2]]
+    later = _better([(one, one) for one in last])
+    rows.append(("last byte after a cell closes, worst", *(f"{ms:.2g} ms" for ms in last), "not built", later))
     for number, (what, scale, unit) in enumerate((("counted wrong", 100, "%"), ("place off by", 1, "mm"))):
         for family in FAMILIES:
             spans = [judged[one, family][number] for one in SHEETS]
@@ -132,7 +135,7 @@ def verdict_table() -> writer.Table:
 
 
 def _better(spans: list[tuple[float, float]]) -> str:
-    names = [one.name.partition(", ")[2] for one, (_, high) in zip(SHEETS, spans, strict=True) if high < spans[0][0]]
+    names = [one.name.partition(", ")[2] for one, (_, high) in zip(SHEETS, spans) if high < spans[0][0]]
     return ", ".join(names) or "no"
 
 
