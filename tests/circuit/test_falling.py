@@ -32,8 +32,8 @@ def extracted() -> Circuit:
 @pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
 @pytest.mark.parametrize(("celsius", "supply_v"), [(-20.0, 3.0), (27.0, 3.3), (70.0, 3.6)])
 def test_the_soft_kit_reads_its_level_at_the_corners_in_ngspice(celsius, supply_v):
-    """On its own lines: the ruler's multiple lies between the times of cells 0.3 octaves from the level's resistance, at
-    a threshold that follows the supply."""
+    """On its own lines, the ruler's multiple lies between the times of cells 0.3 octaves from the level's resistance,
+    at a threshold that follows the supply."""
     kit, cell = kits.kit("soft"), load_cover(kits.kit("soft").skin_path).cell
     circuit = extract.extracted(kit.layout).circuit.replace(supply_v=supply_v)
     lines, at_v = (kit.skin.row_lines, kit.skin.columns), circuit.falling.threshold_v * supply_v / 3.3

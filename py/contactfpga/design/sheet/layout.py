@@ -289,24 +289,15 @@ class _Matrix:
             self._to_row(drawing, (x, y), _GUARD_VIA, net, row)
             return
         node, middle, via_y = f"NG{column}", (x + _DIODE_AT[0], y - _RULER_Y + 0.8), y - _RULER_Y - 0.3
-        (left, ruler_y), right = self._ruler(drawing, middle, {"1": node, "2": net}, 0, (0.0, -1.15, False))
+        nets = {"1": node, "2": net}
+        one = drawing.place("R", RESISTOR, self.ruler, middle, nets, label=(0.0, -1.15, False))
+        (left, ruler_y), right = (one.spot(pad.x, pad.y) for pad in RESISTOR.pads)
         drawing.run(net, "F", (x, end), (x, via_y))
         drawing.via(net, x, via_y)
         drawing.run(net, "B", (x, via_y), (right[0], via_y), right)
         self._diode_to_row(drawing, (x, y), node, row)
         diode_x = middle[0] - 1.1
         drawing.run(node, "B", (left, ruler_y), (diode_x, ruler_y), (diode_x, y + _DIODE_AT[1]))
-
-    def _ruler(
-        self,
-        drawing: Drawing,
-        middle: tuple[float, float],
-        nets: dict[str, str],
-        turn: int,
-        label: tuple[float, float, bool],
-    ) -> list[tuple[float, float]]:
-        one = drawing.place("R", RESISTOR, self.ruler, middle, nets, turn, label=label)
-        return [one.spot(pad.x, pad.y) for pad in RESISTOR.pads]
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
         x, net = self.guard_x, self.column_net(self.skin.columns)
@@ -317,7 +308,9 @@ class _Matrix:
             node = net
             if self.ruler:
                 node = f"NG_{row}"
-                low, high = self._ruler(drawing, (x + _RULER_X, y), {"1": net, "2": node}, 90, (1.2, 0.0, True))
+                middle, nets = (x + _RULER_X, y), {"1": net, "2": node}
+                one = drawing.place("R", RESISTOR, self.ruler, middle, nets, 90, label=(1.2, 0.0, True))
+                low, high = (one.spot(pad.x, pad.y) for pad in RESISTOR.pads)
                 drawing.run(net, "B", (x, y), (low[0], y), low)
                 drawing.run(node, "B", high, (high[0], y - 1.1), (at, y - 1.1))
             else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from typing import NamedTuple
 
@@ -105,38 +105,39 @@ def _judged(sheet: Sheet, family: str, workers: Executor) -> tuple[Interval, Int
 
 
 def verdict_table() -> writer.Table:
-    """What both kits come to; the last column names the soft sheets that are better, beyond intervals if there are
-    any."""
-    rows: list[tuple[str, ...]] = []
+    """What both kits come to; the last columns compare the soft sheets with the starter kit, beyond intervals if there
+    are any."""
+    rows = []
+
+    def row(what: str, form: str, spans: Sequence[tuple[float, float, float]], without: str = "") -> None:
+        cells = [form.format(*one) for one in spans] + [without] * (len(SHEETS) - len(spans))
+        rows.append((what, *cells, *_compared(spans)))
+
     with pool.executor() as workers:
         judged = {(one, family): _judged(one, family, workers) for one in SHEETS for family in FAMILIES}
     felt = [predict.measured(predict.pressing(one.cover, {"spread": 0.0}), kits.kit(one.kit).skin, 0) for one in SHEETS]
-    for name, what, unit in (
-        ("felt_half_n", "half of fingers felt from", "N"),
-        ("first_closing_ms", "foam touched at 150 mm/s until felt", "ms"),
+    row("half of fingers felt from", "{:.2f} N", [(one["felt_half_n"],) * 3 for one in felt])
+    row("foam touched at 150 mm/s until felt", "{:.1f} ms", [(one["first_closing_ms"],) * 3 for one in felt])
+    last_ms = [1e-3 * predictions.load(kits.kit(one.kit))["last_byte_worst_us"].value for one in SHEETS[:2]]
+    row("last byte after a cell closes, worst", "{:.2f} ms", [(one,) * 3 for one in last_ms], "not built")
+    for number, what, scale, form in (
+        (0, "counted wrong", 100, "{:.1f} % ({:.1f} to {:.1f})"),
+        (1, "place off by", 1, "{:.2f} mm ({:.2f} to {:.2f})"),
     ):
-        values = [one[name] for one in felt]
-        rows.append((what, *(f"{value:.2g} {unit}" for value in values), _better([(one, one) for one in values])))
-    last = [1e-3 * predictions.load(kits.kit(one.kit))["last_byte_worst_us"].value for one in SHEETS[:2]]
-    later = _better([(one, one) for one in last])
-    rows.append(("last byte after a cell closes, worst", *(f"{ms:.2g} ms" for ms in last), "not built", later))
-    for number, (what, scale, unit) in enumerate((("counted wrong", 100, "%"), ("place off by", 1, "mm"))):
         for family in FAMILIES:
             spans = [judged[one, family][number] for one in SHEETS]
-            cells = (
-                f"{scale * s.mean:.{2 - number}g} {unit} ({scale * s.low:.2g} to {scale * s.high:.2g})" for s in spans
-            )
-            rows.append((f"{family} {what}", *cells, _better([(one.low, one.high) for one in spans])))
-    soldered = [joints(kits.kit(one.kit)) for one in SHEETS]
-    prices = [SETUP_USD + JOINT_USD * count for count in soldered]
-    assembled = (f"{count} joints, {usd:.2f} USD" for count, usd in zip(soldered, prices, strict=True))
-    rows.append(("assembly without parts", *assembled, _better([(usd, usd) for usd in prices])))
-    return writer.Table(("what", *(one.name for one in SHEETS), "better"), rows)
+            row(f"{family} {what}", form, [(scale * one.mean, scale * one.low, scale * one.high) for one in spans])
+    prices = [SETUP_USD + JOINT_USD * joints(kits.kit(one.kit)) for one in SHEETS]
+    row("assembly without parts", "{:.2f} USD", [(usd,) * 3 for usd in prices])
+    return writer.Table(("what", *(one.name for one in SHEETS), *(one.name[6:] for one in SHEETS[1:])), rows)
 
 
-def _better(spans: list[tuple[float, float]]) -> str:
-    names = [one.name.partition(", ")[2] for one, (_, high) in zip(SHEETS, spans) if high < spans[0][0]]
-    return ", ".join(names) or "no"
+def _compared(spans: Sequence[tuple[float, float, float]]) -> Iterator[str]:
+    """Each soft sheet against the starter kit, by mean, low and high."""
+    (_, low, high), *soft = spans
+    for _, least, most in soft:
+        yield "better" if most < low else "worse" if least > high else "even"
+    yield from [""] * (len(SHEETS) - len(spans))
 
 
 def joints(kit: Kit) -> int:
@@ -150,14 +151,11 @@ def leakage_table() -> str:
     kit, cover = kits.kit("soft"), load_cover(kits.kit("soft").skin_path)
     assert cover is not None
     assert cover.cell is not None
-    circuit, forces_n = (
-        extracted(kit.layout).circuit,
-        sorted({force for one in SHEETS[1:] for force in one.reading.forces_n}),
-    )
+    circuit = extracted(kit.layout).circuit
+    forces_n = sorted({force for one in SHEETS[1:] for force in one.reading.forces_n})
     ohm = cover.cell.ohm(np.array(forces_n))
-    rows = [
-        ["leakage of a pin", *(f"{force:g} N, {each / 1e3:.3g} kΩ" for force, each in zip(forces_n, ohm, strict=True))]
-    ]
+    cells = [f"{force:g} N, {each / 1e3:.3g} kΩ" for force, each in zip(forces_n, ohm, strict=True)]
+    rows = [["leakage of a pin", *cells]]
     for leak in LEAKS_UA:
         octaves = falling.error_octaves(circuit, kit.skin.row_lines, kit.skin.columns, ohm, leak)
         rows.append([f"{leak:g} µA", *(f"{one:.2f}" if math.isfinite(one) else "never read" for one in octaves)])

@@ -151,32 +151,21 @@ def soft_pieces() -> list[Piece]:
     middles, board, film = [number * pitch for number in range(CELLS)], BOARDS["plane"][0], 0.3
     edge, foot = middles[-1] + pitch / 2, -board - SOFT_SPACER_MM
     cut = [(x - pitch / 2 + 0.1, x + pitch / 2 - 0.1) for x in middles]
-    teeth = [(x - half + 0.5 * number, 0.15) for x in middles for number in range(round(4 * half))]
-    corner = edge + 6.0
-    return [
-        Piece(
-            1,
-            f"foam of {thick:g} mm, cut with the film",
-            SOFT,
-            [(a, film + 0.15, b, film + 0.15 + thick) for a, b in cut],
-        ),
-        Piece(
-            1, "resistive film (0.1 mm, drawn thicker)", picture_style.INK, [(a, 0.15, b, 0.15 + film) for a, b in cut]
-        ),
-        Piece(
-            1,
-            "two combs of copper for each cell",
-            picture_style.VERMILLION,
-            [(x, 0, x + 0.25, y) for x, y in teeth if x < edge],
-        ),
-        Piece(1, f"circuit board, {board:g} mm", "#d0ece3", [(-LEFT_MM, -board, corner + 4, 0)]),
-        Piece(1, "a diode for each cell", "#8c8c8c", [(x - 1, -board - 1, x + 1, -board) for x in middles]),
-        Piece(1, "header with the plug of a flat cable", picture_style.SOFT, [(1.5, -board - PLUG_MM, 4.9, -board)]),
-        Piece(
-            1, f"spacer, {SOFT_SPACER_MM:g} mm, at each corner", "#8c8c8c", [(corner - 2.5, foot, corner + 2.5, -board)]
-        ),
-        Piece(1, "link of the robot", picture_style.SHEET, [(-LEFT_MM, foot - 2, corner + 5, foot)]),
+    teeth = [x - half + 0.5 * number for x in middles for number in range(round(4 * half))]
+    corner, low, high = edge + 6.0, 0.15, 0.15 + film
+    diodes = [(x - 1, -board - 1, x + 1, -board) for x in middles]
+    spacer = f"spacer, {SOFT_SPACER_MM:g} mm, at each corner"
+    found = [
+        (f"foam of {thick:g} mm, cut with the film", SOFT, [(a, high, b, high + thick) for a, b in cut]),
+        ("resistive film (0.1 mm, drawn thicker)", picture_style.INK, [(a, low, b, high) for a, b in cut]),
+        ("two combs of copper for each cell", picture_style.VERMILLION, [(x, 0, x + 0.25, low) for x in teeth]),
+        (f"circuit board, {board:g} mm", "#d0ece3", [(-LEFT_MM, -board, corner + 4, 0)]),
+        ("a diode for each cell", "#8c8c8c", diodes),
+        ("header with the plug of a flat cable", picture_style.SOFT, [(1.5, -board - PLUG_MM, 4.9, -board)]),
+        (spacer, "#8c8c8c", [(corner - 2.5, foot, corner + 2.5, -board)]),
+        ("link of the robot", picture_style.SHEET, [(-LEFT_MM, foot - 2, corner + 5, foot)]),
     ]
+    return [Piece(1, *one) for one in found]
 
 
 def _write(path: Path, title: str, shown: list[Piece], named: list[Piece]) -> None:
