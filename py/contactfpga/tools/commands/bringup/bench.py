@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit
 from contactfpga.design.cover import Cover
+from contactfpga.design.cover.fitted import Film
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.instruments.settling import Settling
 from contactfpga.skin import Skin
-
-if TYPE_CHECKING:
-    from contactfpga.tools.commands.bringup.film import Film
 
 
 class Person(Protocol):

@@ -5,14 +5,13 @@ A cell's least sample that reads pressed is a fall time, hence a resistance by t
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.design.circuit import falling
 from contactfpga.design.cover import Cover
+from contactfpga.design.cover.fitted import ODD, fit_film
 from contactfpga.driver.health import Finding
 from contactfpga.instruments.rest import NEVER
 from contactfpga.instruments.watch import named
@@ -21,34 +20,7 @@ from contactfpga.tools.commands.wire import rest
 
 CELL_N = 0.15, 0.45
 """Forces on each cell, from light to heavy."""
-WITHIN = 0.1
-"""Share by which the force on cells may differ from that: an uneven weight, a preload."""
-ODD = 4.0
-"""Factor from the usual resistance beyond which a cell is a fault."""
 KG_N = 9.81
-
-
-class Fitted(NamedTuple):
-    """A value of ``[cover.cell]`` with its 95 % interval, by cells that differ and weights that are not exact."""
-
-    name: str
-    value: float
-    low: float
-    high: float
-
-
-@dataclasses.dataclass(frozen=True)
-class Film:
-    """The film's law on this sheet."""
-
-    values: tuple[Fitted, ...]
-    factors: np.ndarray
-    """(rows, columns) resistance of each cell over the usual one; NaN for a cell that never reads pressed."""
-
-    def csv(self) -> str:
-        """The factors, a row of the sheet in each line; nothing stands for a cell that never reads pressed."""
-        lines = (",".join("" if np.isnan(one) else f"{one:.3f}" for one in row) for row in self.factors.tolist())
-        return "\n".join(lines) + "\n"
 
 
 def share(cover: Cover, pitch_x_mm: float, pitch_y_mm: float) -> float:
@@ -74,7 +46,7 @@ def film(bench: Bench) -> Step:
     if np.isfinite(ohm[0]).mean() < 0.5:
         few = "most cells read released under the lighter weight; does it lie evenly on the foam?"
         return Step("film", (Finding("fault", few),))
-    bench.film = fitted(np.array(ohm))
+    bench.film = fit_film(np.array(ohm), CELL_N)
     found = [*_odd(bench.film.factors)]
     for name, value, low, high in bench.film.values:
         given = getattr(cover.cell, name)
@@ -82,32 +54,6 @@ def film(bench: Bench) -> Step:
         found.append(Finding("ok", f"{name} = {value:.4g} ({low:.4g} to {high:.4g}), {inside}"))
     measured = {f"film_{name}": value for name, value, _, _ in bench.film.values}
     return Step("film", tuple(found), measured)
-
-
-def fitted(ohm: np.ndarray) -> Film:
-    """The law R = R1 (F / 1 N)^-k by medians, from (2, rows, columns) resistances under :data:`CELL_N`; NaN: open."""
-    logs, forces = np.log(ohm), np.log(CELL_N)
-    away = np.ma.masked_invalid(logs - np.nanmedian(logs, axis=(1, 2), keepdims=True))
-    factors = np.exp(away.mean(axis=0)).filled(np.nan)
-    factors[np.isnan(ohm[-1])] = np.nan
-    sound = (factors < ODD) & (factors > 1 / ODD) & np.isfinite(logs).all(axis=0)
-    each = -np.diff(logs[:, sound], axis=0)[0] / np.diff(forces)[0]
-    exponent, near = _median(each, np.sqrt(2) * WITHIN / np.diff(forces)[0])
-    usual, about = _median((logs[:, sound] + exponent * forces[:, None]).mean(axis=0), exponent * WITHIN)
-    spread = float(np.log(factors[sound]).std())
-    wide = 1.96 * spread / np.sqrt(2 * sound.sum())
-    values = (
-        Fitted("ohm_at_1n", *np.exp((usual, usual - about, usual + about)).tolist()),
-        Fitted("exponent", exponent, exponent - near, exponent + near),
-        Fitted("spread", spread, spread - wide, spread + wide),
-    )
-    return Film(values, factors)
-
-
-def _median(values: np.ndarray, within: float) -> tuple[float, float]:
-    """The median, and half of its 95 % interval for values that are drawn from a normal distribution, with what else
-    may move them all."""
-    return float(np.median(values)), float(np.hypot(1.96 * 1.253 * values.std() / np.sqrt(len(values)), within))
 
 
 def _odd(factors: np.ndarray) -> Iterator[Finding]:

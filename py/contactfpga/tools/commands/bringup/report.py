@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 from contactfpga import __version__
 from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit, FittedValue
-from contactfpga.design.cover.fitted import FittedForce
+from contactfpga.design.cover.fitted import Film, FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.skin import Skin
 from contactfpga.tools.commands.bringup.bench import Step
-from contactfpga.tools.commands.bringup.film import Film
 
 NOT_FITTED = (
     "[cover] is not fitted: a board does not feel forces. Lay the sheet on a kitchen scale, press a rod of 4 mm on the "
