@@ -241,7 +241,11 @@ def column_capacitor(pf: float) -> Part:
     """A capacitor of this many pF whose temperature moves nothing; without a number outside the E24 series."""
     digits, power = f"{pf:.1e}".split("e")
     code = digits.replace(".", "") + str(int(power) - 1)
-    number = f"CC0603JRNPO9BN{code}" if int(code[:2]) in _E24 and float(digits) * 10 ** int(power) == pf >= 10 else ""
+    number = (
+        f"CC0603JRNPO9BN{code}"
+        if int(code[:2]) in _E24 and round(float(digits) * 10 ** int(power), 6) == pf >= 10
+        else ""
+    )
     order = "capacitor, 0603, C0G (NP0), 5 %, 50 V"
     return dataclasses.replace(CAPACITOR, order=order, article=("Yageo", number) if number else ("", ""))
 
