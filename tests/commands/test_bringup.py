@@ -2,9 +2,11 @@
 
 import datetime
 import json
+import re
 import sys
 import tomllib
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -295,9 +297,13 @@ def test_weights_on_a_film_give_its_law_and_each_cells_factor_and_name_a_dead_an
     port = VirtualBoard(skin, hand, circuit=extracted(kit.layout).circuit, cover=cover)
     port._cells.ohm = ohm
     with contactfpga.open(port, skin=skin) as board:
-        person = types.SimpleNamespace(asked=lambda does, words: hand.does(does), rest_s=0.01, stuck_s=0.1)
+        asked = []
+        person = types.SimpleNamespace(asked=lambda does, words: asked.append(words) or hand.does(does))
         bench = Bench(board, skin, person, load_circuit(kit.skin_path), cover=cover)
         step = film.film(bench)
+    light, heavy = (float(re.search(r"with ([0-9.]+) kg", words)[1]) for words in asked)
+    assert heavy / light == pytest.approx(3, rel=0.02)
+    assert f"{light} and {heavy} kg" in Path("docs/soft.md").read_text(encoding="utf-8")
     faults = [one.sentence for one in step.findings if one.verdict == "fault"]
     assert [one.partition(")")[0] for one in faults] == ["cell (3, 5", "cell (12, 1"]
     assert "never reads pressed under the weights" in faults[0]

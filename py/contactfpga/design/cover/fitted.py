@@ -76,7 +76,6 @@ def fit_film(ohm: np.ndarray, forces_n: Sequence[float]) -> Film:
     logs, forces = np.log(ohm), np.log(forces_n)
     away = np.ma.masked_invalid(logs - np.nanmedian(logs, axis=(1, 2), keepdims=True))
     factors = np.exp(away.mean(axis=0)).filled(np.nan)
-    factors[np.isnan(ohm[-1])] = np.nan
     sound = (factors < ODD) & (factors > 1 / ODD) & np.isfinite(logs).all(axis=0)
     each = -np.diff(logs[:, sound], axis=0)[0] / np.diff(forces)[0]
     exponent, near = _median(each, np.sqrt(2) * WITHIN / np.diff(forces)[0])
