@@ -238,16 +238,9 @@ CAPACITOR = Part(
 
 
 def column_capacitor(pf: float) -> Part:
-    """A capacitor of this many pF whose temperature moves nothing; without a number outside the E24 series."""
-    digits, power = f"{pf:.1e}".split("e")
-    code = digits.replace(".", "") + str(int(power) - 1)
-    number = (
-        f"CC0603JRNPO9BN{code}"
-        if int(code[:2]) in _E24 and round(float(digits) * 10 ** int(power), 6) == pf >= 10
-        else ""
-    )
-    order = "capacitor, 0603, C0G (NP0), 5 %, 50 V"
-    return dataclasses.replace(CAPACITOR, order=order, article=("Yageo", number) if number else ("", ""))
+    """A capacitor whose value heat does not move; only that of 220 pF has a number."""
+    article = ("Yageo", "CC0603JRNPO9BN221") if pf == 220 else ("", "")
+    return dataclasses.replace(CAPACITOR, order="capacitor, 0603, C0G (NP0), 5 %, 50 V", article=article)
 
 
 FIDUCIAL = Part(

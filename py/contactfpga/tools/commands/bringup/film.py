@@ -10,7 +10,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.design.circuit import falling
-from contactfpga.design.cover import Cover
 from contactfpga.design.cover.fitted import ODD, fit_film
 from contactfpga.driver.health import Finding
 from contactfpga.instruments.rest import NEVER
@@ -23,18 +22,15 @@ CELL_N = 0.15, 0.45
 KG_N = 9.81
 
 
-def share(cover: Cover, pitch_x_mm: float, pitch_y_mm: float) -> float:
-    """Share of an even weight on the foam that cells carry; the board beside them carries the rest."""
-    return cover.width_m(1e-3 * pitch_x_mm) * cover.width_m(1e-3 * pitch_y_mm) / (1e-6 * pitch_x_mm * pitch_y_mm)
-
-
 def film(bench: Bench) -> Step:
     """Resistances under two weights on the whole sheet."""
     skin, cover = bench.skin, bench.cover
-    if cover is None or cover.cell is None or bench.stated is None or bench.stated.falling is None:
-        note = "the kit states no [cover.cell] or no [circuit.falling] to compare with"
-        return Step("film", (Finding("note", note),))
-    ohm, cells = [], skin.rows * skin.columns / share(cover, skin.pitch_x_mm, skin.pitch_y_mm)
+    assert cover is not None
+    assert cover.cell is not None
+    assert bench.stated is not None
+    # the board beside the cells carries the rest of an even weight
+    wide_mm, high_mm = (1e3 * cover.width_m(1e-3 * pitch) for pitch in (skin.pitch_x_mm, skin.pitch_y_mm))
+    cells, ohm = skin.rows * skin.columns * skin.pitch_x_mm * skin.pitch_y_mm / (wide_mm * high_mm), []
     for force in CELL_N:
         whole = f"Lay a flat plate as large as all cells on the foam, with {force * cells / KG_N:.1f} kg in all, evenly"
         bench.person.asked(f"weight {force:g}", f"{whole}, and wait ten seconds.")
