@@ -11,7 +11,7 @@ from contactfpga import Skin, examples
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.design import buildable, kits
-from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, load_circuit
+from contactfpga.design.circuit import Circuit, CircuitError, check, check_times, falling, load_circuit
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.skin import SkinError
 from contactfpga.tools import cli
@@ -82,11 +82,13 @@ def test_the_circuit_that_a_kit_states_covers_that_of_its_sheet(name):
     for value in ("line_pf", "crossing_pf", "neighbor_pf", "line_ohm"):
         assert getattr(stated, value) >= getattr(found, value) > 0, value
     check_times(found, kit.skin)
+    if found.falling:
+        falling.check(found, kit.skin)
 
 
 def test_a_kit_that_is_not_there_is_reported_with_those_that_are(capsys):
     assert cli.main(["build", "--kit", "huge"]) == 1
-    assert "'huge' is no kit; take one of fast, starter" in capsys.readouterr().err
+    assert "'huge' is no kit; take one of fast, soft, starter" in capsys.readouterr().err
     assert cli.main(["build", "icestick", "--kit", "starter"]) == 1
     assert "the kit 'starter' is for icebreaker, not icestick" in capsys.readouterr().err
     assert cli.main(["build"]) == 1

@@ -16,7 +16,7 @@ import trimesh
 from scipy import ndimage
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import needed
+from contactfpga.design.circuit import falling, needed
 from contactfpga.design.cover import load_cover
 from contactfpga.design.kits import KitError
 from contactfpga.design.predictions import Prediction
@@ -53,9 +53,14 @@ def test_predictions_are_what_is_computed_today(name):
     kit = kits.kit(name)
     found = predictions.load(kit)
     circuit = extracted(kit.layout).circuit
-    needs = needed(circuit, kit.skin.row_lines, kit.skin.column_lines)
-    assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
-    assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
+    if kit.skin.ruler:
+        assert found["sample_us"].value == pytest.approx(found["ruler_us"].value * kit.skin.ruler / 16, rel=1e-4)
+        fallen_us = 1e6 * falling.fall_s(circuit, found["level_ohm"].value, kit.skin.row_lines)[0]
+        assert found["sample_us"].value == pytest.approx(fallen_us, rel=0.01)
+    else:
+        needs = needed(circuit, kit.skin.row_lines, kit.skin.column_lines)
+        assert found["settle_us"].value == pytest.approx(1e6 * needs.settle.seconds, rel=1e-4)
+        assert found["row_ma"].value == pytest.approx(needs.pressed.pin_ma, rel=1e-4)
     some = latency.measure(kit.skin, touches=12)
     assert some.touch_to_last_byte_us.worst <= found["last_byte_worst_us"].high
     assert some.bytes == found["frame_bytes"].value

@@ -7,11 +7,13 @@ that does not track, and a level that a pull or hot diodes hold up.
 import numpy as np
 import pytest
 
+from contactfpga.design import kits
 from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, CircuitError, falling, load_checked, phases
 from contactfpga.design.circuit.falling import Corner
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.circuit.values import Falling
+from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import extract
 from contactfpga.design.sheet.layout import lay_out
 from contactfpga.skin import Skin
@@ -24,6 +26,27 @@ STATED = Circuit(falling=Falling(), column_pull_ohm=1e8, diode=SILICON, series_o
 def extracted() -> Circuit:
     """Lines of an 8x8 sheet as its layout has them."""
     return extract.extracted(lay_out(Skin(rows=SIZE, columns=SIZE), STATED)).circuit
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
+@pytest.mark.parametrize(("celsius", "supply_v"), [(-20.0, 3.0), (27.0, 3.3), (70.0, 3.6)])
+def test_the_soft_kit_reads_its_level_at_the_corners_in_ngspice(celsius, supply_v):
+    """On its own lines, the ruler's multiple lies between the times of cells 0.3 octaves from the level's resistance,
+    at a threshold that follows the supply."""
+    kit, cell = kits.kit("soft"), load_cover(kits.kit("soft").skin_path).cell
+    circuit = extract.extracted(kit.layout).circuit.replace(supply_v=supply_v)
+    lines, at_v = (kit.skin.row_lines, kit.skin.columns), circuit.falling.threshold_v * supply_v / 3.3
+    fallen_s = []
+    for ohm in (circuit.falling.ruler_ohm, cell.level_ohm / 2**0.3, cell.level_ohm * 2**0.3):
+        cells, row = np.full(lines, np.inf), lines[0] // 2
+        cells[row] = ohm if not fallen_s else np.inf  # the ruler's columns fall together
+        cells[row, 3] = ohm
+        phase = phases.settle(Network(circuit, np.isfinite(cells), ohm=cells), Levels.of(circuit))
+        seconds, volts = agreement.run(phase, 60e-6, 6000, celsius)
+        fallen_s.append(float(np.interp(-at_v, -volts[:, 3], seconds)))
+    ruler_s, harder_s, lighter_s = fallen_s
+    assert harder_s < ruler_s * kit.skin.ruler / falling.SIXTEENTHS < lighter_s
 
 
 PATTERNS = {

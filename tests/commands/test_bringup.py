@@ -2,21 +2,29 @@
 
 import datetime
 import json
+import re
 import sys
 import tomllib
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
 from planted_sheets import CIRCUIT, LARGE, SKIN, TESTED, Faults, brought_up, drawn, faults_of
 
+import contactfpga
 from contactfpga import Skin
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import Circuit, fit, load_circuit
+from contactfpga.design.cover import load_cover
 from contactfpga.design.predictions import Prediction
+from contactfpga.design.sheet.extract import extracted
 from contactfpga.instruments.settling import Slow
 from contactfpga.tools.commands import bringup
-from contactfpga.tools.commands.bringup import report, steps, times
+from contactfpga.tools.commands.bringup import film, report, steps, times
+from contactfpga.tools.commands.bringup.bench import Bench
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.scenes.hand import Hand
 from contactfpga_sim.model.sheet.matrix import Shorts
 
 CASES = {
@@ -273,6 +281,44 @@ def test_a_rehearsal_of_a_kit_writes_its_report(tmp_path, run):
     assert (grade["name"], grade["as_predicted"]) == ("settle_us", True)
 
 
+@pytest.mark.slow
+def test_weights_on_a_film_give_its_law_and_each_cells_factor_and_name_a_dead_and_a_shorted_cell():
+    """Factors, law and faults are drawn here, and replace those of the virtual board."""
+    kit, rng = kits.kit("soft"), np.random.default_rng(7)
+    skin = bringup.bring_up_skin(kit)
+    factors, cover = np.exp(0.3 * rng.standard_normal((16, 16))), load_cover(kit.skin_path)
+    hand, dead, shorted = Hand(16, 16), (3, 5), (12, 1)
+
+    def ohm(force_n, seconds):
+        found = np.where(force_n > 0, 15_000.0 * factors * np.maximum(force_n, 1e-9) ** -0.8, np.inf)
+        found[dead], found[shorted] = np.inf, 300.0
+        return found
+
+    port = VirtualBoard(skin, hand, circuit=extracted(kit.layout).circuit, cover=cover)
+    port._cells.ohm = ohm
+    with contactfpga.open(port, skin=skin) as board:
+        asked = []
+        person = types.SimpleNamespace(asked=lambda does, words: asked.append(words) or hand.does(does))
+        bench = Bench(board, skin, person, load_circuit(kit.skin_path), cover=cover)
+        step = film.film(bench)
+    light, heavy = (float(re.search(r"with ([0-9.]+) kg", words)[1]) for words in asked)
+    assert heavy / light == pytest.approx(3, rel=0.02)
+    assert f"{light} and {heavy} kg" in Path("docs/soft.md").read_text(encoding="utf-8")
+    faults = [one.sentence for one in step.findings if one.verdict == "fault"]
+    assert [one.partition(")")[0] for one in faults] == ["cell (3, 5", "cell (12, 1"]
+    assert "never reads pressed under the weights" in faults[0]
+    assert "far too sensitive" in faults[1]
+    law = {one.name: one for one in bench.film.values}
+    for name, planted in (("ohm_at_1n", 15_000.0 * np.median(factors)), ("exponent", 0.8), ("spread", 0.3)):
+        assert law[name].low < planted < law[name].high, name
+    sound = np.ones((16, 16), bool)
+    sound[dead] = sound[shorted] = False
+    assert bench.film.factors[sound] == pytest.approx(factors[sound] / np.median(factors), rel=0.12)
+    rows = bench.film.csv().splitlines()
+    assert rows[3].split(",")[5] == ""
+    assert float(rows[0].split(",")[15]) == pytest.approx(bench.film.factors[0, 15], abs=1e-3)
+
+
 def test_without_a_board_the_report_says_so(tmp_path, run):
     path = tmp_path / "report.md"
     status, said, _ = run("bringup", "--kit", "starter", tmp_path / "ttyNone", "--output", path, "--yes")
@@ -288,8 +334,9 @@ def test_the_skin_of_a_bring_up_is_the_kits_with_cells(name, tmp_path, run):
     path, kit = tmp_path / "skin.toml", kits.kit(name)
     said = " ".join(run("bringup", "--kit", name, "--skin-output", path)[1].split())
     assert f"contactfpga build {kit.board.name} --skin {path}" in said
-    skin = Skin.load(path)
-    assert (skin.report, skin.replace(report="moments", send=kit.skin.send)) == ("cells", kit.skin)
+    skin, usual = Skin.load(path), kit.skin
+    later = bringup.LATER if usual.ruler else 1
+    assert skin == usual.replace(report="cells", send="always", settle_us=later * usual.settle_us)
     assert load_circuit(path) == load_circuit(kit.skin_path)
     assert run("build", kit.board.name, "--skin", path, "--wiring")[0] == 0
 
@@ -300,8 +347,8 @@ NO_NUMBERS = ("", "settle_us", "=1", "settle_us=", "settle_us=nan", "settle_us=1
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ([], "name a kit: --kit fast or starter"),
-        (["--kit", "huge"], "'huge' is no kit; take one of fast, starter"),
+        ([], "name a kit: --kit fast or soft or starter"),
+        (["--kit", "huge"], "'huge' is no kit; take one of fast, soft, starter"),
         (["--kit", "starter", "--measured", "moon=1"], "--measured moon: the kit predicts nothing of this name"),
         *(
             (["--kit", "fast", f"--measured={text}"], f"'{text}' must be NAME=VALUE, with a finite number")

@@ -49,6 +49,19 @@ def test_all_files_are_there_and_the_circuit_is_complete(tmp_path, skin, capsys)
     assert answer["kicad"] is None
 
 
+def test_a_sheet_with_a_ruler_has_combs_and_no_caps(tmp_path, capsys):
+    file = examples() / "kits" / "soft" / "skin.toml"
+    assert cli.main(["sheet", str(file), "-o", str(tmp_path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {path.name for path in tmp_path.iterdir()} == ALL - {"sheet-caps.stl", "sheet-frame.stl"}
+    assert (answer["caps"], answer["by_hand"], answer["parts"]["D_SOD-323"]) == (None, {}, 256 + 32)
+    assert load_circuit(tmp_path / "skin.toml").falling == load_circuit(file).falling
+    bom = (tmp_path / "sheet-bom.csv").read_text()
+    assert all(number in bom for number in ("1N4148WS-E3-08", "RC0603FR-0724KL", "CC0603JRNPO9BN221"))
+    assert cli.main(["sheet", str(file), "-o", str(tmp_path), "--part", "tact"]) == 1
+    assert "ruler is 31; its sheet needs combs, not switches" in capsys.readouterr().err
+
+
 def test_a_sheet_on_a_bed_has_feet_as_wide_as_its_pads(tmp_path, skin):
     bed = "thickness_m = 0.01\narea_m2 = 0.0009\nmass_kg = 0.1\n"
     skin.write_text(skin.read_text(encoding="utf-8-sig") + f'[cover]\nmodel = "foam"\n[cover.bed]\n{bed}')

@@ -3,7 +3,6 @@
 import dataclasses
 import random
 import re
-import zipfile
 
 import pytest
 from random_sheet import drawn, refused
@@ -17,11 +16,12 @@ from traced_board import TracedBoard, lines_of, written
 from contactfpga import Skin
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.design import kits
-from contactfpga.design.sheet import files
-from contactfpga.design.sheet.caps import caps
+from contactfpga.design.circuit import load_circuit
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 
+RULER_OHM, COLUMN_PF = 24_000.0, 220
+"""Of the soft kit."""
 TILE = {"pitch_x_mm": 6.4, "pitch_y_mm": 6.4}
 CLOSED = {"surface": "cylinder", "closed": True}
 REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
@@ -101,7 +101,8 @@ def check_against_the_wiring_table(board, skin, series=33.0, pulls=None):
     for output in wiring.outputs(skin):
         leads(board.pad(chips[output.chip, output.chain, output.number], output.pin), output.line)
         used.add((chips[output.chip, output.chain, output.number], output.pin))
-    ties(board, chips, used, supply, ground)
+    columns = {one for name, one in lines.items() if "column" in name}
+    ties(board, chips, used, supply, ground, columns if skin.ruler else ())
     assert len(set(lines.values())) == len(lines)
 
 
@@ -117,12 +118,31 @@ def guarded(board, skin, rows, columns, lines):
     assert len(board.diodes) == switched + skin.guard * (skin.rows + skin.columns)
     if not skin.guard:
         return
+    if skin.ruler:
+        lines |= ruled(board, skin, rows, columns)
+        return
     nodes = {board.pad(name, 2) for name in board.parts("SW")}
     ((guard_column),) = {a for a, b in between if a not in nodes}
     ((guard_row),) = {b for a, b in pairs if b not in rows.values()}
     assert {b for a, b in pairs if a == guard_column} == set(rows.values())
     assert {a for a, b in pairs if b == guard_row} == set(columns.values())
     lines |= {"guard row": guard_row, "guard column": guard_column}
+
+
+def ruled(board, skin, rows, columns):
+    """Guard lines whose crossings are a resistor of the ruler and a diode, found from those; returns both lines."""
+    nodes = {board.pad(name, 2) for name in board.parts("SW")}
+    crossings = {}  # (column's copper, row's copper): resistance
+    for anode, cathode in board.diodes:
+        if anode not in nodes:
+            ((column, ohms),) = board.resistors[anode]
+            crossings[column, cathode] = ohms
+    assert set(crossings.values()) == {RULER_OHM}
+    ((guard_column),) = {column for column, _ in crossings} - set(columns.values())
+    ((guard_row),) = {row for _, row in crossings} - set(rows.values())
+    below = {(column, guard_row) for column in columns.values()}
+    assert set(crossings) == below | {(guard_column, row) for row in rows.values()}
+    return {"guard row": guard_row, "guard column": guard_column}
 
 
 def named_chips(board, skin, wires):
@@ -141,8 +161,9 @@ def named_chips(board, skin, wires):
     return found
 
 
-def ties(board, chips, used, supply, ground):
-    """Supplies and inputs that are held, as docs/boards.md lists them; 100 nF at each chip."""
+def ties(board, chips, used, supply, ground, floating):
+    """Supplies and inputs that are held, as docs/boards.md lists them; 100 nF at each chip, and a capacitor at each
+    column that floats."""
     held = {"74HC595": {8: ground, 16: supply, 10: supply}, "74HC165": {8: ground, 16: supply, 15: ground}}
     for (kind, chain, number), name in chips.items():
         pins = dict(held[kind])
@@ -151,9 +172,13 @@ def ties(board, chips, used, supply, ground):
             if (kind, chain, number + 1) not in chips:
                 pins[10] = ground
         assert {pin: board.pad(name, pin) for pin in pins} == pins
+    held, charged = [], []
     for name in board.parts("C"):
-        assert {board.pad(name, 1), board.pad(name, 2)} == {supply, ground}
-    assert len(board.parts("C")) == len(chips)
+        ends = {board.pad(name, 1), board.pad(name, 2)}
+        assert ground in ends
+        (held if supply in ends else charged).append((*(ends - {ground}), board.values[name]))
+    assert len(held) == len(chips)
+    assert sorted(charged) == sorted((line, f"{COLUMN_PF}p") for line in floating)
 
 
 @pytest.mark.parametrize("name", sample(list(SKINS), quick=QUICK, slow=SLOW))
@@ -167,10 +192,10 @@ RIBBON = {"1": 1, "7": 2, "2": 3, "8": 4, "3": 5, "9": 6, "4": 7, "10": 8, "5": 
 """Wire of a flat cable at each pin of a PMOD socket: 1 to 6 in one row, 7 to 12 in the other."""
 
 
-def test_three_flat_cables_join_the_starter_kit_to_its_board(tmp_path):
-    kit = kits.kit("starter")
-    files.write(tmp_path, kit.layout, caps(kit.skin, kit.layout.switch), "")
-    zipfile.ZipFile(tmp_path / "sheet-board.zip").extractall(tmp_path)
+@pytest.mark.parametrize("name", ["starter", "soft"])
+def test_three_flat_cables_join_a_kit_to_its_board(tmp_path, name):
+    kit = kits.kit(name)
+    written(tmp_path, kit.skin, circuit=load_circuit(kit.skin_path), board=kit.board)
     board = TracedBoard(tmp_path)
     check_against_the_wiring_table(board, kit.skin, pulls={"column": 47_000.0})
     sockets = {"PMOD1A": "J1", "PMOD1B": "J2", "PMOD2": "J3"}

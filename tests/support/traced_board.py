@@ -83,8 +83,8 @@ def drawn_layer(path, low, high):
 
 def written(folder, skin, part="dome", **given):
     """Lay out a sheet and write its files into a folder, those for the board house unpacked."""
-    layout = lay_out(skin, part=part, **given)
-    files.write(folder, layout, caps(skin, layout.switch), "")
+    layout = lay_out(skin, part=None if skin.ruler else part, **given)
+    files.write(folder, layout, None if skin.ruler else caps(skin, layout.switch), "")
     zipfile.ZipFile(folder / "sheet-board.zip").extractall(folder)
     return layout
 

@@ -135,6 +135,8 @@ _ALL = (
             tolerances=Section("tables:tolerances_table", sample="tables:tolerances_table"),
             sensitivity=Section("sensitivity:sensitivity_table"),
             beds=Section("beds:beds_table"),
+            against=Section("soft:verdict_table", page="soft.md"),
+            leakage=Section("soft:leakage_table", page="soft.md", sample="soft:leakage_table"),
         ),
         compute="tables:compute",
         pictures="steps:draw",

@@ -23,9 +23,9 @@ from contactfpga.design.sheet.parts import SheetError
 NAME = "sheet"
 
 
-def write(folder: Path, layout: Layout, caps: Caps, skin_file: str, pad_mm: float | None = None) -> list[str]:
+def write(folder: Path, layout: Layout, caps: Caps | None, skin_file: str, pad_mm: float | None = None) -> list[str]:
     """Write the files, ``skin_file`` as ``skin.toml``, and return their names; the same sheet gives the same bytes.
-    ``pad_mm``: side of the pads below the board, if it lies on some."""
+    ``caps``: None for combs. ``pad_mm``: side of the pads below the board, if it lies on some."""
     drawing, skin = layout.drawing, layout.skin
     title = f"contactfpga sheet {skin.rows}x{skin.columns} {skin.fingerprint.hex()}"
     order = {**gerber.files(drawing, NAME), "fabrication.txt": orders.note(layout)}
@@ -35,14 +35,15 @@ def write(folder: Path, layout: Layout, caps: Caps, skin_file: str, pad_mm: floa
         f"{NAME}-cpl.csv": orders.placement_list(layout).encode(),
         f"{NAME}-assembly.svg": picture.assembly(drawing, title).encode(),
         f"{NAME}-connectors.csv": connectors_list(layout).encode(),
-        f"{NAME}-caps.stl": stl(caps.caps()),
         f"{NAME}.kicad_pcb": kicad.board(drawing, title, BOARDS[skin.surface][0]).encode(),
         f"{NAME}.kicad_pro": kicad.project(NAME).encode(),
         f"{NAME}.net": kicad.netlist(drawing).encode(),
         f"{NAME}.svg": picture.svg(drawing, title).encode(),
         "skin.toml": skin_file.encode(),
     }
-    if (frame := caps.frame()) is not None:
+    if caps is not None:
+        contents[f"{NAME}-caps.stl"] = stl(caps.caps())
+    if caps is not None and (frame := caps.frame()) is not None:
         contents[f"{NAME}-frame.stl"] = stl(frame)
     if skin.closed:
         contents[f"{NAME}-clamp.stl"] = stl(tube.clamps(skin, drawing.tab_mm))
@@ -96,9 +97,10 @@ def connections(layout: Layout) -> dict[str, list[tuple[str, ...]]]:
 
 def circuit_table(circuit: Circuit) -> str:
     values = {name: value for name, value in dataclasses.asdict(circuit).items() if value is not None}
-    diode = values.pop("diode")
+    tables = {name: values.pop(name) for name in ("diode", "falling") if name in values}
     lines = ["[circuit]", *(f"{name} = {value!r}" for name, value in values.items())]
-    lines += ["", "[circuit.diode]", *(f"{name} = {value!r}" for name, value in diode.items())]
+    for name, table in tables.items():
+        lines += ["", f"[circuit.{name}]", *(f"{key} = {value!r}" for key, value in table.items())]
     return "\n".join(lines) + "\n"
 
 

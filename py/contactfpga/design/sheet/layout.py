@@ -13,7 +13,7 @@ import math
 from contactfpga import __version__
 from contactfpga.boards import wiring
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.design.circuit import Circuit
+from contactfpga.design.circuit import SILICON, Circuit
 from contactfpga.design.sheet import strip, tube
 from contactfpga.design.sheet.drawing import (
     CLEARANCE_MM,
@@ -27,7 +27,18 @@ from contactfpga.design.sheet.drawing import (
     PlacedPart,
     width_mm,
 )
-from contactfpga.design.sheet.parts import DIODE, FIDUCIAL, SWITCHES, Pad, SheetError, SwitchPart, find_switch
+from contactfpga.design.sheet.parts import (
+    DIODE,
+    FIDUCIAL,
+    RESISTOR,
+    SILICON_DIODE,
+    SWITCHES,
+    Pad,
+    SheetError,
+    SwitchPart,
+    comb,
+    find_switch,
+)
 from contactfpga.design.sheet.strip import PLACE_MM, Line, port
 from contactfpga.skin import Skin
 
@@ -44,9 +55,12 @@ _ROW_Y = 2.0
 _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
 """Offset of the track that brings a row to its first switch, with room for a via."""
 _ROW_START = -2.0
-_GUARD_ROW_Y = 4.2
+_GUARD_ROW_Y, _RULER_Y = 4.2, 2.7
+"""Distance of the guard row from the last row, and what the ruler's resistors add to it."""
 _GUARD_VIA = 0.0, -0.6
-_GUARD_DIODE_X = -0.35
+_GUARD_DIODE_X, _RULER_X = -0.35, 1.2
+_RULED_MM = 5.2
+"""Height that a guard column's diode takes with its print."""
 _GUARD_EDGE = 0.7
 """Distance from the guard column to the seam: half a resistor and :data:`EDGE_MM`."""
 
@@ -73,16 +87,23 @@ _PRINT_GAP = 0.25
 def lay_out(
     skin: Skin,
     circuit: Circuit | None = None,
-    part: str = "dome",
+    part: str | None = None,
     margin_mm: float = MARGIN_MM,
     board: BoardSpec | None = None,
 ) -> Layout:
-    """Lay out the sheet of a Skin with the switch ``part``; with a ``board`` whose wires are all at PMOD sockets, its
-    headers have their order. Raises :class:`SheetError` for cells finer than their parts,
-    for a radius too small to bend to, and for lines or tabs without a place around a closed cylinder."""
-    switch, fitted = find_switch(part), circuit or FITTED
+    """Lay out the sheet of a Skin with the switch ``part``, a dome by default, or with combs for a resistive film if it
+    has a ruler; with a ``board`` whose wires are all at PMOD sockets, its headers have their order.
+
+    Raises :class:`SheetError` for cells finer than their parts, for a radius too small to bend to, for lines or tabs
+    without a place around a closed cylinder, and for a ruler without its values, with switches, or around one.
+    """
+    switch = comb(skin.pitch_x_mm, skin.pitch_y_mm) if skin.ruler and part is None else find_switch(part or "dome")
+    fitted = circuit or FITTED
+    if skin.ruler and (part or fitted.falling is None or skin.closed):
+        why = "the table [circuit.falling]" if fitted.falling is None else "combs, not switches" if part else ""
+        raise SheetError(f"ruler is {skin.ruler}; its sheet needs {why or 'edges: it cannot be closed'}")
     _check(skin, switch)
-    matrix = _Matrix(skin, switch)
+    matrix = _Matrix(skin, switch, fitted)
     lines = matrix.lines()
     drawing = Drawing()
     base = -skin.pitch_y_mm / 2 - 0.4
@@ -99,11 +120,17 @@ def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
     wide = switch.part.width + CLEARANCE_MM
     cell = _FEED_Y + VIA_MM / 2 + CLEARANCE_MM - switch.via[1] + VIA_MM / 2
     high = max(switch.part.height + CLEARANCE_MM, 2 * switch.reach + TRACK_MM + CLEARANCE_MM, cell)
+    if skin.ruler:
+        high = max(high, _RULED_MM)
     if skin.columns > 1:
         wide = max(wide, 2 * switch.half_width + VIA_MM + 2 * CLEARANCE_MM, 2 * PLACE_MM)
     if skin.closed and skin.guard:
         wide = max(wide, 2 * (switch.half_width + CLEARANCE_MM + TRACK_MM / 2 + _GUARD_EDGE))
     return wide, high
+
+
+def _guard_row_y(skin: Skin) -> float:
+    return _GUARD_ROW_Y + _RULER_Y * bool(skin.ruler)
 
 
 def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:
@@ -115,7 +142,7 @@ def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:
 def _check(skin: Skin, switch: SwitchPart) -> None:
     for name, pitch, limit in _too_fine(skin, switch):
         steps = [f"set {name} = {limit:.4g} or more"]
-        for part, other in SWITCHES.items():
+        for part, other in () if skin.ruler else SWITCHES.items():
             still = {axis: finest for axis, _, finest in _too_fine(skin, other)}
             if still.get(name, 0.0) < limit:
                 steps.append(f"take --part {part}" + "".join(f" and {axis} = {mm:.4g}" for axis, mm in still.items()))
@@ -126,8 +153,11 @@ def _check(skin: Skin, switch: SwitchPart) -> None:
 
 
 class _Matrix:
-    def __init__(self, skin: Skin, switch: SwitchPart):
+    def __init__(self, skin: Skin, switch: SwitchPart, circuit: Circuit):
         self.skin, self.switch = skin, switch
+        self.diode = (SILICON_DIODE, "1N4148WS") if circuit.diode == SILICON else (DIODE, "BAT54WS")
+        self.ruler = f"{circuit.falling.ruler_ohm:g}" if skin.ruler and circuit.falling else ""
+        """Resistance between a guard line's crossing and its diode; "" for none."""
         self.px, self.py = skin.pitch_x_mm, skin.pitch_y_mm
         self.last_x = (skin.columns - 1) * self.px
         edge = self.px / 2 - _GUARD_EDGE if skin.closed else self.px / 2
@@ -136,7 +166,7 @@ class _Matrix:
         self.risers = self._risers()
 
     def row_y(self, row: int) -> float:
-        return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _GUARD_ROW_Y
+        return row * self.py if row < self.skin.rows else (self.skin.rows - 1) * self.py + _guard_row_y(self.skin)
 
     def row_net(self, row: int) -> str:
         return f"ROW{row}" if row < self.skin.rows else "ROW_GUARD"
@@ -210,7 +240,8 @@ class _Matrix:
                 drawing.run(net, "F", (x, y - reach), (x, y + reach))
             return
         node = self.row_net(row) if self.skin.diodes == "none" else f"N{row}_{column}"
-        drawing.place("SW", self.switch.part, self.switch.part.name, (x, y), {"1": net, "2": node}, back=False)
+        value = self.switch.part.name if self.switch.part.order else ""  # nobody buys copper
+        drawing.place("SW", self.switch.part, value, (x, y), {"1": net, "2": node}, back=False)
         column_tracks = self.switch.column[: len(self.switch.column) - (self.switch.tail if row == last else 0)]
         for tracks, name in ((column_tracks, net), (self.switch.diode, node)):
             for x1, y1, x2, y2 in tracks:
@@ -227,10 +258,14 @@ class _Matrix:
         if self.skin.diodes == "none":
             drawing.run(node, "B", via, (right, via[1]), (right, y + _ROW_Y))
             return
-        middle = x + _DIODE_AT[0], y + _DIODE_AT[1]
+        self._diode_to_row(drawing, cell, node, row)
+        left, middle_y = x + _DIODE_AT[0] - 1.1, y + _DIODE_AT[1]
+        drawing.run(node, "B", via, (left, via[1]), (left, middle_y))
+
+    def _diode_to_row(self, drawing: Drawing, cell: tuple[float, float], node: str, row: str) -> None:
+        middle = cell[0] + _DIODE_AT[0], cell[1] + _DIODE_AT[1]
         self._diode(drawing, middle, node, row, 180, (-0.3, -1.08))
-        drawing.run(node, "B", via, (middle[0] - 1.1, via[1]), (middle[0] - 1.1, middle[1]))
-        drawing.run(row, "B", (right, middle[1]), (right, y + _ROW_Y))
+        drawing.run(row, "B", (middle[0] + 1.1, middle[1]), (middle[0] + 1.1, cell[1] + _ROW_Y))
 
     def _diode(
         self,
@@ -243,13 +278,26 @@ class _Matrix:
     ) -> None:
         low = self.skin.diodes == "col2row"
         nets = {"1": row, "2": node} if low else {"1": node, "2": row}
-        drawing.place("D", DIODE, "BAT54WS", middle, nets, turn if low else (turn + 180) % 360, label=(*label, False))
+        drawing.place("D", *self.diode, middle, nets, turn if low else (turn + 180) % 360, label=(*label, False))
 
     def _guard_cell(self, drawing: Drawing, column: int) -> None:
         x, y, net = column * self.px, self.row_y(self.skin.rows), self.column_net(column)
         end = (self.skin.rows - 1) * self.py + self.switch.reach
-        drawing.run(net, "F", (x, end), (x, y + _GUARD_VIA[1]))
-        self._to_row(drawing, (x, y), _GUARD_VIA, net, self.row_net(self.skin.rows))
+        row = self.row_net(self.skin.rows)
+        if not self.ruler:
+            drawing.run(net, "F", (x, end), (x, y + _GUARD_VIA[1]))
+            self._to_row(drawing, (x, y), _GUARD_VIA, net, row)
+            return
+        node, middle, via_y = f"NG{column}", (x + _DIODE_AT[0], y - _RULER_Y + 0.8), y - _RULER_Y - 0.3
+        nets = {"1": node, "2": net}
+        one = drawing.place("R", RESISTOR, self.ruler, middle, nets, label=(0.0, -1.15, False))
+        (left, ruler_y), right = (one.spot(pad.x, pad.y) for pad in RESISTOR.pads)
+        drawing.run(net, "F", (x, end), (x, via_y))
+        drawing.via(net, x, via_y)
+        drawing.run(net, "B", (x, via_y), (right[0], via_y), right)
+        self._diode_to_row(drawing, (x, y), node, row)
+        diode_x = middle[0] - 1.1
+        drawing.run(node, "B", (left, ruler_y), (diode_x, ruler_y), (diode_x, y + _DIODE_AT[1]))
 
     def _guard_column(self, drawing: Drawing, base: float) -> None:
         x, net = self.guard_x, self.column_net(self.skin.columns)
@@ -257,8 +305,17 @@ class _Matrix:
         for row in range(self.skin.rows):
             y, at = self.row_y(row), x + _GUARD_DIODE_X
             drawing.via(net, x, y)
-            drawing.run(net, "B", (at, y - 1.1), (x, y - 1.1), (x, y))
-            self._diode(drawing, (at, y), net, self.row_net(row), 90, (-1.2, -2.4))
+            node = net
+            if self.ruler:
+                node = f"NG_{row}"
+                middle, nets = (x + _RULER_X, y), {"1": net, "2": node}
+                one = drawing.place("R", RESISTOR, self.ruler, middle, nets, 90, label=(1.2, 0.0, True))
+                low, high = (one.spot(pad.x, pad.y) for pad in RESISTOR.pads)
+                drawing.run(net, "B", (x, y), (low[0], y), low)
+                drawing.run(node, "B", high, (high[0], y - 1.1), (at, y - 1.1))
+            else:
+                drawing.run(net, "B", (at, y - 1.1), (x, y - 1.1), (x, y))
+            self._diode(drawing, (at, y), node, self.row_net(row), 90, (-1.2, -2.4))
             drawing.run(self.row_net(row), "B", (at, y + 1.1), (at, y + _ROW_Y))
 
     def _row(self, drawing: Drawing, row: int, base: float) -> None:
@@ -289,7 +346,7 @@ def _outline(drawing: Drawing, skin: Skin, ends: tuple[float, ...], margin_mm: f
         left, right = around
     else:
         left, right = min(left, around[0]) - margin_mm, max(right, around[1]) + margin_mm
-    bottom = (skin.rows - 1) * skin.pitch_y_mm + max(skin.pitch_y_mm / 2, skin.guard * (_GUARD_ROW_Y + 3.2))
+    bottom = (skin.rows - 1) * skin.pitch_y_mm + max(skin.pitch_y_mm / 2, skin.guard * (_guard_row_y(skin) + 3.2))
     drawing.outline = left, top - margin_mm, right, bottom + margin_mm
     inset = margin_mm / 2
     for y in (drawing.outline[1] + inset, drawing.outline[3] - inset):

@@ -90,7 +90,8 @@ def _lines(layout: Layout) -> Iterator[tuple[str, str]]:
     else:
         yield "material", f"FR-4, {thickness:g} mm, 35 um of finished copper"
     bare = not layout.switch.part.soldered
-    yield "finish", "ENIG: gold on nickel" + ("; not HASL, as metal domes touch the bare pads" if bare else "")
+    touches = "metal domes touch" if layout.switch.part.order else "a film touches"
+    yield "finish", "ENIG: gold on nickel" + (f"; not HASL, as {touches} the bare pads" if bare else "")
     yield "solder mask", "both sides, any color" if not flex else "coverlay on both sides, open at the Mask files"
     yield "print", "both sides, white or another color that is easy to read"
     yield "vias", f"{VIA_MM:g} mm with holes of {VIA_DRILL_MM:g} mm, tented on both sides; none lies in a pad"

@@ -151,6 +151,51 @@ TACT = SwitchPart(
     open_pf=0.5,
 )
 
+_TOOTH_MM = 0.25
+"""Width of a comb's teeth, and of the gaps between them."""
+_GAP_PF_MM = 0.037
+"""Capacitance per length of a gap, by :func:`contactfpga.design.sheet.extract.beside_pf` on FR-4."""
+_COMB_HOLE_MM = 0.6
+"""Half of what teeth leave free around the via in the middle."""
+
+
+def comb(pitch_x_mm: float, pitch_y_mm: float) -> SwitchPart:
+    """Two combs of bare copper for a resistive film, as large as the pitch leaves room for: teeth along x, those of the
+    column from a spine on the left, those of the diode from one on the right."""
+    step = 2 * _TOOTH_MM
+    most = max(3, int((pitch_y_mm / 2 - 0.35) / step + 1e-9))
+    last = most - 1 + most % 2  # odd, so that the outermost teeth are the column's
+    reach = last * step
+    half = min(reach + _TOOTH_MM / 2, pitch_x_mm / 2 - 0.5)  # a row's via fits beside it
+    spine = half - _TOOTH_MM / 2
+    pads = [
+        Pad("1", -spine, 0.0, _TOOTH_MM, 2 * reach + _TOOTH_MM),
+        Pad("2", spine, 0.0, _TOOTH_MM, 2 * reach - 2 * step + _TOOTH_MM),
+    ]
+    for number in range(-last, last + 1):
+        y = number * step
+        free = -_COMB_HOLE_MM if abs(y) < 1.5 * step else half - step
+        side, left, right = ("1", -half, free) if number % 2 else ("2", -free, half)
+        pads.append(Pad(side, (left + right) / 2, y, right - left, _TOOTH_MM))
+    name = f"COMBS_{2 * half:.2f}x{2 * reach + _TOOTH_MM:.2f}MM"
+    part = Part(name, "", tuple(pads), 2 * half, 2 * reach + _TOOTH_MM, pasted=False, soldered=False)
+    column = (0.0, -reach), (-spine, -reach), (-spine, reach), (0.0, reach)
+    return SwitchPart(
+        part,
+        force_n=0.0,
+        travel_mm=0.0,
+        height_mm=0.1,
+        closed_by=2 * half,
+        column=tuple((*a, *b) for a, b in itertools.pairwise(column)),
+        diode=((spine, 0.0, 0.0, 0.0),),
+        via=(0.0, 0.0),
+        tail=0,
+        reach=reach,
+        half_width=half,
+        open_pf=_GAP_PF_MM * 2 * last * (2 * half - step),
+    )
+
+
 SWITCHES = {"dome": DOME, "tact": TACT}
 """The available switches, by the command's name."""
 
@@ -183,10 +228,21 @@ DIODE = Part(
     marks=((-1.8, -0.5, -1.8, 0.5),),
     article=("Vishay", "BAT54WS-E3-08"),
 )
+SILICON_DIODE = dataclasses.replace(
+    DIODE, order="silicon diode, SOD-323; pad 1 is the cathode", article=("Vishay", "1N4148WS-E3-08")
+)
 RESISTOR = Part("R_0603", "resistor, 0603, 1 %", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "RC0603FR-07{}L"))
 CAPACITOR = Part(
     "C_0603", "capacitor, 0603, X7R, 50 V", _pair(0.8, 0.8, 0.8), 2.7, 1.3, article=("Yageo", "CC0603KRX7R9BB104")
 )
+
+
+def column_capacitor(pf: float) -> Part:
+    """A capacitor whose value heat does not move; only that of 220 pF has a number."""
+    article = ("Yageo", "CC0603JRNPO9BN221") if pf == 220 else ("", "")
+    return dataclasses.replace(CAPACITOR, order="capacitor, 0603, C0G (NP0), 5 %, 50 V", article=article)
+
+
 FIDUCIAL = Part(
     "FIDUCIAL",
     "mark for an assembler's camera",

@@ -16,7 +16,17 @@ from contactfpga.design.circuit import Circuit
 from contactfpga.design.sheet import channel
 from contactfpga.design.sheet.channel import GRID_MM, Grid, Pin
 from contactfpga.design.sheet.drawing import GND, SUPPLY, VIA_MM, Drawing
-from contactfpga.design.sheet.parts import CAPACITOR, HC165, HC595, HEADER_PINS, RESISTOR, Part, header, smallest_header
+from contactfpga.design.sheet.parts import (
+    CAPACITOR,
+    HC165,
+    HC595,
+    HEADER_PINS,
+    RESISTOR,
+    Part,
+    column_capacitor,
+    header,
+    smallest_header,
+)
 from contactfpga.skin import Skin
 
 PLACE_MM = 2.6
@@ -104,12 +114,17 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
     ohms = f"{circuit.series_ohm:g}"
     drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": line.pin}, 90, label=_LINE_LABEL)
     yield _stepped(drawing, line.pin, x, middle - 0.8, grid)
+    beside = None
     if line.pull:
+        ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
+        beside = "R", RESISTOR, ohms, SUPPLY if line.pull == "up" else GND
+    elif circuit.falling and line.kind == "column":
+        beside = "C", column_capacitor(circuit.falling.column_pf), f"{circuit.falling.column_pf:g}p", GND
+    if beside:
+        letter, part, value, rail = beside
         x -= _BESIDE
         drawing.run(line.net, "B", (line.x, middle + 0.8), (x, middle + 0.8))
-        ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
-        rail = SUPPLY if line.pull == "up" else GND
-        drawing.place("R", RESISTOR, ohms, (x, middle), {"1": line.net, "2": rail}, 90, label=_LINE_LABEL)
+        drawing.place(letter, part, value, (x, middle), {"1": line.net, "2": rail}, 90, label=_LINE_LABEL)
         yield _stepped(drawing, rail, x, middle - 0.8, grid)
 
 

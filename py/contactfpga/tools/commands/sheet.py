@@ -11,7 +11,7 @@ from typing import Any
 
 from contactfpga import terminal
 from contactfpga.design import kits
-from contactfpga.design.circuit import Circuit, load_checked, needed_by, recommended_us
+from contactfpga.design.circuit import Circuit, falling, load_checked, needed_by, recommended_us
 from contactfpga.design.cover import load_cover
 from contactfpga.design.sheet import SWITCHES, lay_out
 from contactfpga.design.sheet.drawing import CLEARANCE_MM, TRACK_MM, VIA_DRILL_MM, VIA_MM
@@ -28,8 +28,10 @@ def add_flags(flag: flags.Flags) -> None:
     flag("[SKIN.toml]", "Skin to lay out, with its tables [circuit] and [cover].")
     flags.kit(flag)
     flags.output_folder(flag, "build/sheet")
-    part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N."
-    flag("--part", part, tuple(SWITCHES), "dome")
+    part = "Switch of each cell (default: dome): dome, a metal dome of 5 mm and 0.4 N; tact, a tact switch of 1 N. "
+    flag(
+        "--part", f"{part}A Skin with a ruler has combs of copper for a resistive film instead.", tuple(SWITCHES), None
+    )
     flag("--board NAME", "Board whose PMOD sockets the headers are for; a kit has its own.")
     flag("--edge-mm MM", "Board beyond the parts, in mm.", numbers.number(MARGIN_MM, 100, "mm"), MARGIN_MM)
     flag("--cable M", "Length of the ribbon cables, in m.", numbers.number(0, 10, "m"), 0.3)
@@ -50,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
     cover, circuit = load_cover(file), load_checked(file, skin)
     layout = lay_out(skin, circuit, args.part, args.edge_mm, flags.board(args))
     side_mm = cover.cap.side_m * 1e3 if cover and cover.cap else None
-    layer, found = caps(skin, layout.switch, side_mm), extracted(layout, args.cable)
+    layer = None if skin.ruler else caps(skin, layout.switch, side_mm)
+    found = extracted(layout, args.cable)
     times = _times(skin, found.circuit)
     longer = {name: us for name, us in times.items() if us is not None}
     text = files.completed(Path(file).read_text(encoding="utf-8-sig"), found.circuit, longer)
@@ -59,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
     names = files.write(folder, layout, layer, text, cover.bed.pad_mm if cover and cover.bed else None)
     problems = check.findings(folder / f"{files.NAME}.kicad_pcb") if args.kicad else None
     left, top, right, bottom = layout.drawing.bounds()
-    by_hand = [one.part.order for one in layout.drawing.placed if not (one.part.soldered or one.back)]
+    placed = [one for one in layout.drawing.placed if one.value]
+    by_hand = [one.part.order for one in placed if not one.part.soldered]
     note = tube.note(skin) if skin.surface == "cylinder" else houses.too_large(right - left, bottom - top)
     answer: dict[str, Any] = {
         "folder": str(folder),
@@ -67,8 +71,9 @@ def run(args: argparse.Namespace) -> int:
         "board_mm": [round(right - left, 3), round(bottom - top, 3)],
         "note": note,
         "by_hand": collections.Counter(by_hand),
-        "parts": collections.Counter(one.part.name for one in layout.drawing.placed if one.value),
-        "caps": {
+        "parts": collections.Counter(one.part.name for one in placed),
+        "caps": layer
+        and {
             "count": skin.rows * skin.columns - len(set(skin.mask)),
             "side_mm": round(layer.side_mm, 6),
             "gap_mm": round(layer.gap_mm, 6),
@@ -91,6 +96,9 @@ def _times(skin: Skin, circuit: Circuit) -> dict[str, float | None]:
     """Times of the Skin that are too short for the sheet's circuit, with what it needs; None if no time suffices."""
     if skin.diodes == "none":
         return {}  # not in the model
+    if circuit.falling:
+        falling.check(circuit, skin)
+        return {}
     wanted = recommended_us(skin, needed_by(skin, circuit))
     return {name: us for name, us in wanted.items() if us is None or getattr(skin, name) < us}
 
@@ -108,15 +116,17 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     terminal.say("parts: " + ", ".join(f"{count} {name}" for name, count in answer["parts"].items()), hang=2)
     for words, count in answer["by_hand"].items():
         terminal.say(f"laid by hand, so in no file for the assembler: {count} of: {words}", hang=2)
-    cap = answer["caps"]
-    framed = "without a frame, for which the switches are too close or the board too bent"
-    if cap["sinks_mm"] is not None:
-        framed = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
-    terminal.say(
-        f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
-        f"{cap['plunger_mm']:g} mm; {framed}",
-        hang=2,
-    )
+    if cap := answer["caps"]:
+        framed = "without a frame, for which the switches are too close or the board too bent"
+        if cap["sinks_mm"] is not None:
+            framed = f"in the frame an edge drops by {cap['sinks_mm']:.3g} mm at most as a cap tilts"
+        terminal.say(
+            f"caps: {cap['count']} of {cap['side_mm']:g} mm, {cap['gap_mm']:g} mm apart, on plungers of "
+            f"{cap['plunger_mm']:g} mm; {framed}",
+            hang=2,
+        )
+    else:
+        terminal.say("combs of bare copper in each cell, below one film; no caps", hang=2)
     if answer["wiring"]:
         terminal.say(
             "wires: pin of the sheet, name, pin of the board by its print or number; last, those without the sheet"
@@ -145,7 +155,8 @@ def _show(answer: dict[str, Any], skin: Skin) -> None:
     terminal.say(
         f"wrote {len(answer['files'])} files into {answer['folder']}; skin.toml has the completed [circuit]", hang=2
     )
-    terminal.say(f"next: contactfpga settle --skin {shell_words(Path(answer['folder'], 'skin.toml'))}", hang=2)
+    step = "wire --rest" if skin.ruler else "settle"
+    terminal.say(f"next: contactfpga {step} --skin {shell_words(Path(answer['folder'], 'skin.toml'))}", hang=2)
     if answer["kicad"] is not None:
         terminal.say(f"KiCad: {len(answer['kicad'])} findings")
         for finding in answer["kicad"]:

@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.design import kits, predictions
-from contactfpga.design.circuit import Circuit, needed_by
+from contactfpga.design.circuit import Circuit, falling, needed_by
+from contactfpga.design.circuit.falling import Corner
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel, spread_evenly
@@ -100,6 +101,17 @@ COVER = {
     "tilt": Tolerance("closing force of each cap as it tilts", 0.96, 1.04, "frame that holds caps within 0.05 mm"),
 }
 """Tolerances by key of :func:`pressing`. Closing forces of a sheet's domes differ by the cover's ``spread`` besides."""
+FILM = {
+    "force": Tolerance("forces at which a batch of film reaches a resistance", 0.5, 2.0, "no maker states a curve"),
+    "exponent": Tolerance("exponent of the film's law", 0.7, 1.3, "no maker states a curve"),
+    "spread": Tolerance("spread from cell to cell", 0.5, 2.0, "no maker states one"),
+}
+"""Tolerances of resistive cells; the first stands for that of domes."""
+FALLING = {
+    "column_pf": Tolerance("capacitors of columns", 0.95, 1.05, "5 % parts"),
+    "threshold_v": Tolerance("the pins' threshold", 1.1 / 1.4, 1.7 / 1.4, "between VIL and VIH"),
+    "ruler_ohm": Tolerance("resistors of the ruler", 0.99, 1.01, "1 % parts"),
+}
 TILT = (COVER["tilt"].high - COVER["tilt"].low) / math.sqrt(12)
 """Standard deviation of the factor that each cap has of its own."""
 
@@ -110,7 +122,7 @@ def predicted(kit: Kit) -> dict[str, Prediction]:
     return {one.name: one for one in found}
 
 
-UNITS = {"v": "V", "ma": "mA", "n": "N", "share": "%", "s": "1/s"}
+UNITS = {"v": "V", "ma": "mA", "n": "N", "share": "%", "s": "1/s", "1n": "ohm", "exponent": "1", "spread": "1"}
 """Units by the end of a prediction's name, where they differ."""
 
 
@@ -196,6 +208,9 @@ def drawn_circuit(circuit: Circuit, rng: np.random.Generator) -> Circuit:
     factors = {name: one.drawn(rng) for name, one in CIRCUIT.items()}
     diode = {name: getattr(circuit.diode, name) * factors.pop(name) for name in ("junction_pf", "saturation_a")}
     values = {name: getattr(circuit, name) * factor for name, factor in factors.items()}
+    if circuit.falling is not None:
+        parts = {name: getattr(circuit.falling, name) * one.drawn(rng) for name, one in FALLING.items()}
+        values |= {"falling": dataclasses.replace(circuit.falling, **parts), "column_pull_ohm": circuit.column_pull_ohm}
     return circuit.replace(diode=dataclasses.replace(circuit.diode, **diode), **values)
 
 
@@ -221,11 +236,30 @@ def _circuit(kit: Kit) -> Iterator[Prediction]:
     skin, nominal = kit.skin, extracted(kit.layout).circuit
     rng = np.random.default_rng(1)
     drawn = [nominal, *(drawn_circuit(nominal, rng) for _ in range(DRAWS))]
+    if nominal.falling is not None:
+        yield from _falling(kit, drawn, rng)
+        return
     needs = [needed_by(skin, one) for one in drawn]
     command = f"contactfpga settle --kit {kit.name} --margin 1"
     for name, (what, value) in (NEEDED | (PROJECTED if skin.reads_rows else {})).items():
         found = [float(attrgetter(value)(one)) for one in needs]
         yield _made(name, what, [1e6 * one for one in found] if _unit(name) == "us" else found, "circuit", command)
+
+
+def _falling(kit: Kit, drawn: list[Circuit], rng: np.random.Generator) -> Iterator[Prediction]:
+    """What an oscilloscope, and a resistor in a cell's place, tell of columns that fall."""
+    skin, lines = kit.skin, (kit.skin.row_lines, kit.skin.columns)
+    here = f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
+    ruler_us = [1e6 * falling.ruler_s(one, *lines) for one in drawn]
+    yield _made("ruler_us", "a guard row selected until the columns fall", ruler_us, "circuit", here)
+    later = skin.ruler / falling.SIXTEENTHS
+    yield _made("sample_us", "a row selected until it is sampled", [later * one for one in ruler_us], "circuit", here)
+    found = []
+    for number, (one, us) in enumerate(zip(drawn, ruler_us, strict=True)):
+        leak_a = 1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (number > 0)
+        found.append(float(falling.read_ohm(one, lines[0], 1e-6 * later * us, Corner(leak_a=leak_a))))
+    what = "the largest resistor in a cell's place that reads pressed, alone"
+    yield _made("level_ohm", what, found, "circuit", here)
 
 
 class Pressing(NamedTuple):
@@ -270,7 +304,7 @@ MEASURED = {
         )
         for number, (x, y) in enumerate(PLACES)
     },
-    "closing_rod_n": f"force of a rigid rod of {ROD_MM:g} mm on a cap's middle when it is felt",
+    "closing_rod_n": f"force of a rigid rod of {ROD_MM:g} mm on the middle of a cell's cap or tile when it is felt",
     "felt_half_n": f"force from which half of all touches by {FINGER} are felt, anywhere",
     "felt_most_n": f"force from which 99 % of all touches by {FINGER} are felt, anywhere",
     "felt_share": f"touches of {PRESSED_N:g} N by {FINGER} that are felt, at those nine places",
@@ -286,8 +320,20 @@ MEASURED = {
 def _cover(kit: Kit) -> Iterator[Prediction]:
     stated = load_cover(kit.skin_path)
     assert stated is not None
-    rng = np.random.default_rng(2)
-    drawn = [measured(pressing(stated, drawn_factors(rng)), kit.skin, seed) for seed in range(DRAWS)]
+    rng, film = np.random.default_rng(2), stated.cell
+    factors = [drawn_factors(rng) for _ in range(DRAWS)]
+    if film is not None:
+        films = [{name: one.drawn(rng) for name, one in FILM.items()} for _ in range(DRAWS)]
+        factors = [one | {"force": of["force"], "tilt": 0.0} for one, of in zip(factors, films, strict=True)]
+        of_1n = [film.ohm_at_1n, *(film.ohm_at_1n * of["force"] ** film.exponent for of in films)]
+        command = f"contactfpga bringup --kit {kit.name}"
+        yield _made(
+            "film_ohm_at_1n", "resistance of the usual cell under 1 N, by the fitted law", of_1n, "cover", command
+        )
+        for name, what in (("exponent", "exponent of the fitted law"), ("spread", "spread of the cells' resistances")):
+            values = [getattr(film, name) * one for one in (1.0, *(of[name] for of in films))]
+            yield _made(f"film_{name}", what, values, "cover", command)
+    drawn = [measured(pressing(stated, one), kit.skin, seed) for seed, one in enumerate(factors)]
     usual = measured(pressing(stated, {"spread": 0.0}), kit.skin, 0) | _felt(stated, kit.skin)
     for name, what in MEASURED.items():
         command = f"contactfpga cover felt --kit {kit.name}"

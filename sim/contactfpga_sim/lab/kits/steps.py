@@ -17,8 +17,8 @@ from contactfpga.inputs.files import write_text
 KIT = kits.kit("starter")
 PX = 14.0
 """Pixels of a millimeter."""
-SPACER_MM, HEADER_MM, PLUG_MM = 5.0, 9.0, 15.0
-"""Length of a spacer, and height of a header without and with its plug."""
+SPACER_MM, SOFT_SPACER_MM, HEADER_MM, PLUG_MM = 5.0, 20.0, 9.0, 15.0
+"""Length of a spacer, and of the soft kit's, and height of a header without and with its plug."""
 CELLS = 2
 LEFT_MM, WORDS_MM, WIDE_MM = 4.0, 28.0, 52.0
 """Left end of the cut and begin of the words, from the first switch's middle, and width of a picture."""
@@ -133,20 +133,53 @@ def draw(folder: Path) -> list[Path]:
     for step in range(1, LAST + 1):
         shown = [one for one in every if one.step <= step and not (step > 4 and one.words.startswith("webs"))]
         path = folder / f"step-{step}.svg"
-        write_text(path, picture_style.for_dark_pages("\n".join([*_lines(step, shown), ""])))
+        named = [one for one in shown if one.step == step or step == LAST]
+        _write(path, f"Step {step} of {LAST}", shown, named)
         found.append(path)
-    return found
+    every = soft_pieces()
+    _write(folder / "soft.svg", "The soft kit", every, every)
+    return [*found, folder / "soft.svg"]
 
 
-def _lines(step: int, shown: list[Piece]) -> Iterator[str]:
-    """What this step adds has an outline and words; what was there before is pale."""
+def soft_pieces() -> list[Piece]:
+    """A cut through the soft kit's sheet, all of it."""
+    kit = kits.kit("soft")
+    cover = load_cover(kit.skin_path)
+    assert cover is not None
+    assert cover.cap is not None
+    pitch, half, thick = kit.skin.pitch_x_mm, 5e2 * cover.cap.side_m, 1e3 * cover.thickness_m
+    middles, board, film = [number * pitch for number in range(CELLS)], BOARDS["plane"][0], 0.3
+    edge, foot = middles[-1] + pitch / 2, -board - SOFT_SPACER_MM
+    cut = [(x - pitch / 2 + 0.1, x + pitch / 2 - 0.1) for x in middles]
+    teeth = [x - half + 0.5 * number for x in middles for number in range(round(4 * half))]
+    corner, low, high = edge + 6.0, 0.15, 0.15 + film
+    diodes = [(x - 1, -board - 1, x + 1, -board) for x in middles]
+    spacer = f"spacer, {SOFT_SPACER_MM:g} mm, at each corner"
+    found = [
+        (f"foam of {thick:g} mm, cut with the film", SOFT, [(a, high, b, high + thick) for a, b in cut]),
+        ("resistive film (0.1 mm, drawn thicker)", picture_style.INK, [(a, low, b, high) for a, b in cut]),
+        ("two combs of copper for each cell", picture_style.VERMILLION, [(x, 0, x + 0.25, low) for x in teeth]),
+        (f"circuit board, {board:g} mm", "#d0ece3", [(-LEFT_MM, -board, corner + 4, 0)]),
+        ("a diode for each cell", "#8c8c8c", diodes),
+        ("header with the plug of a flat cable", picture_style.SOFT, [(1.5, -board - PLUG_MM, 4.9, -board)]),
+        (spacer, "#8c8c8c", [(corner - 2.5, foot, corner + 2.5, -board)]),
+        ("link of the robot", picture_style.SHEET, [(-LEFT_MM, foot - 2, corner + 5, foot)]),
+    ]
+    return [Piece(1, *one) for one in found]
+
+
+def _write(path: Path, title: str, shown: list[Piece], named: list[Piece]) -> None:
+    write_text(path, picture_style.for_dark_pages("\n".join([*_lines(title, shown, named), ""])))
+
+
+def _lines(title: str, shown: list[Piece], named: list[Piece]) -> Iterator[str]:
+    """What is named has an outline and words; what was there before is pale."""
     boxes = [box for one in shown for box in one.boxes]
     high, low = max(box[3] for box in boxes) + 1, min(box[1] for box in boxes) - 1
-    named = [one for one in shown if one.step == step or step == LAST]
     high = max(high, low + 1.3 * len(named) + 1)
     width, height = WIDE_MM * PX, (high - low) * PX
     yield f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}">'
-    yield f"<title>Step {step} of {LAST}: {', '.join(one.words for one in named)}</title>"
+    yield f"<title>{title}: {', '.join(one.words for one in named)}</title>"
     yield f'<rect width="{width:.0f}" height="{height:.0f}" rx="8" fill="{picture_style.CARD}"/>'
     for one in shown:
         new = f'stroke="{picture_style.INK}" stroke-width="1.2"' if one in named else 'opacity="0.45"'

@@ -18,6 +18,7 @@ from contactfpga.skin.several import Several
 from contactfpga_sim.model.board.compiled import CompiledBoard, CompiledSheets
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.felt import UnitReadings
+from contactfpga_sim.model.scenes.hand import Hand
 from contactfpga_sim.model.scenes.recordings import Recording
 from contactfpga_sim.model.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.model.scenes.scene import scene as make_scene
@@ -86,7 +87,7 @@ class VirtualBoard:
         self.skins = (self.skin,)
         self._look_s = look_s
         self._units = _unit_source(self.skin, scene, units)
-        self._scene = make_scene(self.skin, scene, cover)
+        self._scene, self._hand = make_scene(self.skin, scene, cover), scene if isinstance(scene, Hand) else None
         self._cover = cover
         self._touch: CellsAt | None = None
         self._fingers = Scene(())
@@ -152,12 +153,14 @@ class VirtualBoard:
         self._board.hold(np.ones((1, *self.pressed.shape), bool), cycles)
 
     def _forces_n(self) -> np.ndarray:
-        """Forces on resistive cells; under a scene that knows none, four times their level on those pressed."""
+        """Forces on resistive cells; under a scene that knows none, four times their level on those pressed, or what a
+        hand presses with."""
         assert self._cover is not None
         assert self._cells is not None
         now, fingers = self.clock(), self._fingers.forces_n(self.clock(), self.skin, self._cover)
         if self._contacts is None:
-            return fingers + 4 * self._cells.cell.level_n * self._scene(now)
+            each_n = 4 * self._cells.cell.level_n
+            return fingers + (self._hand.force_n(each_n) if self._hand else each_n) * self._scene(now)
         return fingers + self._contacts.forces_n(now, self.skin, self._cover)
 
     def clock(self) -> float:

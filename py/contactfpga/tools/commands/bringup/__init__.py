@@ -38,6 +38,8 @@ SECONDS = 300.0
 """Default longest duration of each step with touches."""
 COUNTED_S = 2.0
 """Time for counting frames of an untouched sheet."""
+LATER = 3
+"""Times the settle time until which cells under weights are read."""
 STUCK_S, REST_S = 10.0, 1.0
 REHEARSAL = "sim://"
 """Port of a virtual kit with a simulated hand."""
@@ -88,13 +90,16 @@ def run(args: argparse.Namespace) -> int:
     report.grades = graded(predicted, measured)
     report.not_measured = [one for name, one in predicted.items() if name not in measured]
     write_text(path, report.to_markdown())
+    if report.film is not None:
+        write_text(path.with_suffix(".csv"), report.film.csv())
     results.show(args, report, lambda: _show_end(report, str(path)))
     return min(report.faults, 1)
 
 
 def bring_up_skin(kit: Kit) -> Skin:
-    """The kit's Skin with all cells in each frame, and without debounce."""
-    return kit.skin.replace(report="cells", debounce="none", send="always")
+    """The kit's Skin with all cells in each frame, and without debounce; with a ruler it waits for lighter cells."""
+    settle_us = kit.skin.settle_us * (LATER if kit.skin.ruler else 1)
+    return kit.skin.replace(report="cells", debounce="none", send="always", settle_us=settle_us)
 
 
 def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
@@ -133,7 +138,7 @@ def _force(
 ) -> FittedForce | None:
     """The switches' force by measured closing forces; None without any, or without a cover."""
     cover, closing = load_cover(kit.skin_path), _closing(measured)
-    if cover is None or not closing:
+    if cover is None or cover.cell or not closing:
         return None
     pairs = [(predicted[name].value, value) for name, value in closing]
     return fit_force(cover.switch.force_n, pairs, math.sqrt(PROBABILITY))
@@ -159,13 +164,14 @@ def _lead(args: argparse.Namespace, kit: Kit, report: BringUpReport) -> None:
                 f"{kit.name} --skin-output FILE` writes the Skin that sends cells, then build and flash it"
             )
         bench = Bench(board, skin, person, load_circuit(kit.skin_path), COUNTED_S, args.timeout)
+        bench.cover = load_cover(kit.skin_path)
         if _closing(args.measured):
             bench.probability = math.sqrt(PROBABILITY)  # the other half of the doubt is the cover's
         if isinstance(person, _Hand):
             bench.seconds = REHEARSED_LINK_S
         for step in _until_lost(steps.run(bench)):
             _add(args, report, step, board.port)
-        report.fitted = bench.fitted
+        report.fitted, report.film = bench.fitted, bench.film
 
 
 def _until_lost(found: Iterator[Step]) -> Iterator[Step]:
@@ -190,9 +196,10 @@ def _rehearsed(kit: Kit, skin: Skin) -> tuple[Person, SimulatedPort]:
     from contactfpga_sim.model.board.virtual import VirtualBoard
     from contactfpga_sim.model.scenes.hand import Hand
 
-    hand = Hand(skin.rows, skin.columns)
+    hand = Hand(skin.rows, skin.columns, skin.derived.frame_clocks / skin.clock_hz)
     circuit = extracted(kit.layout).circuit
-    return _Hand(hand), VirtualBoard(skin, hand, circuit=circuit)
+    cover = load_cover(kit.skin_path) if circuit.falling else None
+    return _Hand(hand), VirtualBoard(skin, hand, circuit=circuit, cover=cover)
 
 
 class _Hand:

@@ -7,6 +7,8 @@ from typing import Protocol
 
 from contactfpga.design.circuit import Circuit
 from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit
+from contactfpga.design.cover import Cover
+from contactfpga.design.cover.fitted import Film
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.instruments.settling import Settling
@@ -22,7 +24,7 @@ class Person(Protocol):
 
     def asked(self, does: str, words: str) -> float:
         """Request an action, and return its longest duration in s once it has begun. ``does``: nothing, finger, ruler,
-        card or plate; ``words``: the request for a person.
+        card, plate, or a weight with the force on each cell in N; ``words``: the request for a person.
         """
 
 
@@ -54,3 +56,6 @@ class Bench:
     """Joint probability of the circuit's intervals."""
     images: dict[str, Settling] = dataclasses.field(default_factory=dict)
     fitted: FittedCircuit | None = None
+    cover: Cover | None = None
+    film: Film | None = None
+    """Law of the resistive cells, once it is measured."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from contactfpga import __version__
 from contactfpga.design.circuit.fit import PROBABILITY, FittedCircuit, FittedValue
-from contactfpga.design.cover.fitted import FittedForce
+from contactfpga.design.cover.fitted import Film, FittedForce
 from contactfpga.design.kits import Kit
 from contactfpga.design.predictions import Prediction
 from contactfpga.skin import Skin
@@ -59,6 +59,7 @@ class BringUpReport:
         self.not_measured: list[Prediction] = []
         self.fitted: FittedCircuit | None = None
         self.force: FittedForce | None = None
+        self.film: Film | None = None
 
     @property
     def faults(self) -> int:
@@ -95,6 +96,7 @@ class BringUpReport:
             ],
             "circuit": {one.name: {"value": one.value, "low": one.low, "high": one.high} for one in self._circuit()},
             "switch_force_n": None if self.force is None else dataclasses.asdict(self.force),
+            "cell": [one._asdict() for one in self.film.values] if self.film else [],
         }
 
     def _circuit(self) -> list[FittedValue]:
@@ -132,6 +134,9 @@ class BringUpReport:
         rows = [("circuit", one.name, one.value, one.low, one.high) for one in self._circuit()]
         if self.force is not None:
             rows.append(("cover.switch", "force_n", self.force.value, self.force.low, self.force.high))
+        if self.film is not None:
+            yield "\nThe CSV file beside this report has the factor of each cell's resistance."
+            rows += [("cover.cell", *one) for one in self.film.values]
         if rows:
             yield f"\n## Fitted\n\nThe intervals are computed to hold together with {100 * PROBABILITY:.0f} %."
             yield "docs/bringup.md says how often they did.\n\n```toml"
@@ -140,7 +145,7 @@ class BringUpReport:
                 for _, name, value, low, high in (row for row in rows if row[0] == table):
                     yield f"{name} = {value:.4g}    # {low:.4g} to {high:.4g}"
             yield "```"
-        if self.force is None:
+        if self.force is None and not self.kit.skin.ruler:
             yield f"\n{NOT_FITTED}"
 
 

@@ -15,7 +15,7 @@ from contactfpga.instruments.self_test import LineFinding, untried
 from contactfpga.instruments.watch import Watch, named, places
 from contactfpga.skin import Skin
 from contactfpga.tools.commands import doctor
-from contactfpga.tools.commands.bringup import times
+from contactfpga.tools.commands.bringup import film, times
 from contactfpga.tools.commands.bringup.bench import Bench, Step
 from contactfpga.tools.console import interrupt
 from contactfpga.zones.zone import Zones
@@ -234,6 +234,8 @@ def _follow(bench: Bench, take: Callable[[Zones], None], seconds: float, whole: 
 def steps_for(skin: Skin) -> list[Callable[[Bench], Step]]:
     if skin.report != "cells":
         return [link, lines]
+    if skin.ruler:
+        return [link, lines, switches, film.film]
     return [link, lines, switches, *[diodes] * skin.self_test, bounce, times.settling, times.circuit]
 
 

@@ -26,8 +26,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     rest, end = Rest((skin.rows, skin.columns)), []
     with interrupt.usual_end():
         try:
-            while (level := rest.next_level()) is not None:
-                rest.take(level, _cells(board.sample_at(level, args.timeout)))
+            _search(board, rest, args.timeout)
             if args.seconds is not None:
                 _follow(board, rest, args.seconds, args.timeout)
         finally:
@@ -39,6 +38,21 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     answer = {"ruler": skin.ruler, "lightest": lightest, "levels": levels, "high": high, "findings": end}
     results.show(args, answer, lambda: _show(rest, skin.ruler, high))
     return 1 if lightest is not None and lightest < skin.ruler else 0
+
+
+def levels(board: Board, timeout: float) -> Rest:
+    """The least sample at which each cell reads pressed under what now lies on the sheet."""
+    rest = Rest((board.skin.rows, board.skin.columns))
+    try:
+        _search(board, rest, timeout)
+    finally:
+        restored(board, timeout)
+    return rest
+
+
+def _search(board: Board, rest: Rest, timeout: float) -> None:
+    while (level := rest.next_level()) is not None:
+        rest.take(level, _cells(board.sample_at(level, timeout)))
 
 
 def _follow(board: Board, rest: Rest, seconds: float, timeout: float) -> None:
