@@ -17,7 +17,7 @@ from study_pages import outdated
 from contactfpga.design.cover import BODIES, Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.apps import errors, result_cache, speed, stats
+from contactfpga_sim.apps import errors, result_cache, score, speed, stats
 from contactfpga_sim.apps.errors import Blob
 from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
@@ -64,7 +64,7 @@ def test_found_and_there_are_paired_at_the_least_total_distance():
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 1000), (1, 1000), (500, 1000), (7, 7)])
 def test_shares_have_wilsons_interval(hits, count):
-    got = stats.interval([1.0] * hits + [0.0] * (count - hits))
+    got = score.interval([1.0] * hits + [0.0] * (count - hits))
     want = binomtest(hits, count).proportion_ci(method="wilson")
     assert (got.mean, got.low, got.high) == pytest.approx((hits / count, want.low, want.high), abs=1e-12)
 
@@ -73,7 +73,7 @@ def test_the_interval_of_a_mean_holds_it_95_times_of_100():
     rng = np.random.default_rng(5)
     inside = 0
     for _ in range(1000):
-        got = stats.interval(rng.exponential(2.0, 400).tolist())
+        got = score.interval(rng.exponential(2.0, 400).tolist())
         inside += got.low <= 2.0 <= got.high
     assert 925 <= inside <= 970
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contactfpga.design.cover import BODIES, Cover
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab.chart.methods import sheet
 from contactfpga_sim.lab.cover.elements import touching
 from contactfpga_sim.lab.levels import compute, tables

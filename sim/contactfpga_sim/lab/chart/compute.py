@@ -15,9 +15,9 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import errors, result_cache, size, stats
+from contactfpga_sim.apps import errors, result_cache, score, size, stats
 from contactfpga_sim.apps.errors import METRICS
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
@@ -113,7 +113,7 @@ def study(
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     return {
-        kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        kind: {name: score.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
 
@@ -125,7 +125,7 @@ def accuracies(task: Task) -> list[Found]:
     for first in range(0, task.count, PIECE):
         found.append(accuracy(task, first))
         wrong = [value for piece in found for value in piece["total"]["miscounted"]]
-        if stats.interval(wrong).low > BAD:
+        if score.interval(wrong).low > BAD:
             break
     return found
 

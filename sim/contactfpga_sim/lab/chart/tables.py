@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import pool, speed
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.chart import front_picture, host, numbers, times_picture
 from contactfpga_sim.lab.chart.compute import (
