@@ -20,7 +20,7 @@ from contactfpga.zones import levels
 from contactfpga_sim.apps import score
 from contactfpga_sim.apps.covers import DOME, sheet
 from contactfpga_sim.apps.score import MODELS, Archive, Entry, Scores
-from contactfpga_sim.lab.benchmark.scenes import SEED, STEPS, padded
+from contactfpga_sim.lab.benchmark.scenes import PITCHES_MM, SEED, STEPS, padded
 
 SPREAD = 0.2
 """Standard deviation of the logarithm of a cell's gain."""
@@ -80,9 +80,9 @@ def cells(reading: Reading, forces_n: np.ndarray, pitch_mm: float, seeds: tuple[
     return places(Sensed(forces_n, *seeds).levels(reading), pitch_mm, reading.lasts)
 
 
-def domes(forces_n: np.ndarray, pitch_mm: float, seeds: tuple[int, ...]) -> np.ndarray:
+def domes(force_n: float, forces_n: np.ndarray, pitch_mm: float, seeds: tuple[int, ...]) -> np.ndarray:
     spread = np.clip(np.random.default_rng(seeds).standard_normal(forces_n.shape), -3, 3)
-    return places((forces_n >= DOME.force_n * (1 + DOME.spread * spread)).astype(int), pitch_mm)
+    return places((forces_n >= force_n * (1 + DOME.spread * spread)).astype(int), pitch_mm)
 
 
 RANGE, FULL_N, NOISE_STEPS, CROSSTALK, GAINS = 255, 10.0, 1.0, 0.01, 0.05
@@ -131,6 +131,12 @@ LIGHT_US, LIGHT_N = 22.0, 0.2
 """Time of a row of cells whose lightest level this is (``examples/cells.toml``). It goes as one over that force."""
 
 
+KITS_MM = 6.4
+ONE_N = (0.07, 0.1, 0.2, 0.4)
+THREE_N = ((0.05, 0.2, 0.8), (0.07, 0.28, 1.13), (0.1, 0.4, 1.6), (0.2, 1.6, 3.2))
+"""The kits' pitch, and by pitch the best one level and three levels."""
+
+
 class Method(NamedTuple):
     kind: str
     pitch_mm: float
@@ -148,31 +154,30 @@ def light(pitch_mm: float, forces_n: tuple[float, ...], lasts: int = 1) -> Metho
     return Method("simulated", pitch_mm, forces_n[0], functools.partial(cells, reading), pace)
 
 
+def _of_domes(kind: str, pitch_mm: float, pace: Pace, force_n: float = DOME.force_n) -> Method:
+    return Method(kind, pitch_mm, force_n, functools.partial(domes, force_n), pace)
+
+
 def _methods() -> dict[str, Method]:
     """Forces of levels are those that docs/levels.md chooses."""
-    skin = sheet(6.4)
+    skin = sheet(KITS_MM)
     cells, scan_us = skin.rows * skin.columns, skin.rows * ROW_US
+    zones, array = Pace(scan_us, 0.0, BYTE_US * ZONES), Pace(1000.0, 0.0, BYTE_US * (4 + cells))
     # 100 MHz: 60 cycles and the settle time per row, 15 cycles per cell, 500 per frame; full-speed USB.
     mcu = Pace(skin.rows * (skin.settle_us + 0.6), (15 * cells + 500) / 100, 8 * ZONES / 12, 1000.0)
-    host = Pace(scan_us, 0.0, BYTE_US * (FRAME + math.ceil(cells / 8)))
-    array = Pace(1000.0, 0.0, BYTE_US * (4 + cells))
-    force = DOME.force_n
     found = {
-        f"domes, {pitch:g} mm": Method("simulated", pitch, force, domes, Pace(160 / pitch * ROW_US, 0, BYTE_US * ZONES))
-        for pitch in (6.4, 5.0, 8.0)
+        f"domes, {pitch:g} mm": _of_domes("simulated", pitch, zones._replace(scan_us=sheet(pitch).rows * ROW_US))
+        for pitch in PITCHES_MM
     }
-    for pitch, one, three in (
-        (4.0, 0.07, (0.05, 0.2, 0.8)),
-        (5.0, 0.1, (0.07, 0.28, 1.13)),
-        (6.4, 0.2, (0.1, 0.4, 1.6)),
-        (8.0, 0.4, (0.2, 1.6, 3.2)),
-    ):
+    for force in (0.2, 0.6, 1.0):
+        found[f"domes of {force:g} N, {KITS_MM:g} mm"] = _of_domes("simulated", KITS_MM, zones, force)
+    for pitch, one, three in zip(PITCHES_MM, ONE_N, THREE_N, strict=True):
         found[f"one level, {pitch:g} mm"] = light(pitch, (one,))
         found[f"three levels, {pitch:g} mm"] = light(pitch, three, 2)
     return found | {
-        "analog array, 6.4 mm": Method("model", 6.4, force, analog, array),
-        "microcontroller, 6.4 mm": Method("model", 6.4, force, domes, mcu),
-        "OpenCV, 6.4 mm": Method("model", 6.4, force, domes, host),
+        "analog array": Method("model", KITS_MM, DOME.force_n, analog, array),
+        "microcontroller": _of_domes("model", KITS_MM, mcu),
+        "OpenCV": _of_domes("model", KITS_MM, Pace(scan_us, 0.0, BYTE_US * (FRAME + math.ceil(cells / 8)))),
     }
 
 

@@ -25,6 +25,9 @@ from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 
+FAMILY = "fingers"
+"""The family that compares all methods."""
+
 PIECE = 100
 
 TIMED = 200

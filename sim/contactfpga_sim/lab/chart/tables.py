@@ -12,9 +12,10 @@ from contactfpga.skin import Skin
 from contactfpga_sim.apps import pool, speed
 from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.chart import front_picture, host, numbers, times_picture
+from contactfpga_sim.lab.chart import host, numbers, times_picture
 from contactfpga_sim.lab.chart.compute import (
     FAMILIES_DRAWN,
+    FAMILY,
     Point,
     Task,
     covered,
@@ -39,7 +40,7 @@ def compute() -> list[Point]:
         Task(name, *method, family, PLACEMENTS, 0)
         for family in FAMILIES_DRAWN
         for name, method in METHODS.items()
-        if family == front_picture.FAMILY or name in SHEETS
+        if family == FAMILY or name in SHEETS
     ]
     with pool.executor() as executor, pool.progress() as step:
         points = study(tasks, executor, True, step)
@@ -48,8 +49,7 @@ def compute() -> list[Point]:
 
 
 def draw(folder: Path, points: list[Point]) -> list[Path]:
-    times = times_picture.save(points, folder.parent / "chart" / "times.svg")
-    return [times, front_picture.save(points, folder / "front.svg")]
+    return [times_picture.save(points, folder.parent / "chart" / "times.svg")]
 
 
 COMPARED = [f"{name}, 6.4 mm, tiles" for name in ("run", "serial", "projection", "cells", "reversal")]
@@ -83,7 +83,7 @@ def front_table(points: list[Point]) -> writer.Table:
 
 def methods_table(points: list[Point]) -> writer.Table:
     method = to_build(points)
-    some = [point for point in points if point.task.family == front_picture.FAMILY]
+    some = [point for point in points if point.task.family == FAMILY]
     rows = [(_name(point, method), *_cells(point), f"{point.luts:,}" if point.luts else "") for point in some]
     columns = ("method", HEAD[0], "electronics alone", "miscounted", "barycenter of found", "LUT4")
     return writer.Table(("method", *HEAD, "LUT4"), rows, lambda row: row[0] in COMPARED, columns)

@@ -1,14 +1,51 @@
-"""Tables of docs/levels.md."""
+"""Tables of docs/levels.md and docs/benchmark.md, and the picture of the benchmark's entries."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from contactfpga_sim.apps import score
 from contactfpga_sim.apps.score import MODELS, Interval
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.benchmark.scenes import FAMILIES
+from contactfpga_sim.lab.chart import front_picture
 from contactfpga_sim.lab.levels.compute import Found, Judged
+from contactfpga_sim.lab.levels.compute import compute as study
 
 SHOWN = ("1", "3")
 """Numbers of levels that the page shows: those of a map with one and with two bits a cell."""
+
+
+SCORES = Path("docs/chart/benchmark.csv")
+
+
+def compute() -> Found:
+    found = study()
+    score.write(SCORES, found.entries)
+    return found
+
+
+def draw(folder: Path) -> Path:
+    return front_picture.save(SCORES, folder / "front.svg")
+
+
+def entries_table(found: Found) -> writer.Table:
+    """The benchmark's entries, by the model under which each counts worse."""
+    head = [
+        "entry",
+        *(f"worst family, {model}" for model in MODELS),
+        "place, elements",
+        "touch to last byte, median / 95 %",
+    ]
+    rows = []
+    for entry, scores in found.entries:
+        families = [score.worst(scores, model) for model in MODELS]
+        shares = [f"{family} {_share(scores[family, model].wrong)}" for family, model in zip(families, MODELS)]
+        every = scores["all", MODELS[-1]]
+        late = f"{1e3 * every.median_s.mean:.1f} / {1e3 * every.late_s.mean:.1f} ms"
+        named = f"{entry.name} (model)" if entry.kind == "model" else entry.name
+        rows.append([named, *shares, f"{every.place_mm.mean:.2f} mm", late])
+    return writer.Table(head, rows)
 
 
 def levels_table(found: Found) -> writer.Table:
