@@ -19,9 +19,11 @@ from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.apps import errors, result_cache, score, speed, stats
 from contactfpga_sim.apps.errors import Blob
+from contactfpga_sim.lab.benchmark import entries
 from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
+from contactfpga_sim.lab.levels.tables import SCORES
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -322,23 +324,26 @@ def test_the_page_shows_what_its_numbers_say(tmp_path):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
 
 
-def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    axes, _ = front_picture.picture(points).axes
-    left, right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
-    shown = [method for row in front_picture.ROWS.values() for method in row.methods.values()]
-    assert len(marks) == len(shown) == len(set(shown))
-    for line in csv.DictReader((ROOT / tables.NUMBERS).read_text(encoding="utf-8").splitlines()):
-        if line["family"] == "fingers" and line["method"] in shown:
-            x, y = float(line["touch_median_us"]) + float(line["host_us"]), 100 * float(line["total_miscounted"])
-            assert any((x, y) == pytest.approx(mark) for mark in marks), line["method"]
-            assert left < x < right
-            assert bottom < y < top
-            fast = (line["method"].startswith("reversal"), 24_000_000, 12_000_000)
-            skin = METHODS[line["method"]].skin
-            assert ((skin.clock_hz, skin.baud) == fast[1:]) == fast[0]  # as the legend says
+def test_the_picture_of_the_front_has_its_entries_where_their_scores_say():
+    """Each panel by the worst family and the mean of the worse model, and the kits in a ring."""
+    with open(ROOT / SCORES, newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    figure = front_picture.picture(lines)
+    for axes, field, factor in zip(figure.axes, ("wrong", "place_mm"), (100, 1), strict=True):
+        marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
+        left, right, bottom, top = *axes.get_xlim(), *axes.get_ylim()
+        for entry in entries.METHODS:
+            of = [line for line in lines if line["entry"] == entry]
+            x = 1e3 * max(float(line["median_s"]) for line in of if line["family"] != "all")
+            for family in ({"all"}, set(FAMILIES_DRAWN)):
+                y = factor * np.nanmax([float(line[field]) for line in of if line["family"] in family])
+                assert any((x, max(y, bottom)) == pytest.approx(mark) for mark in marks), (entry, field)
+                assert left < x < right
+                assert y < top
+    assert sum(len(axes.texts) - 1 for axes in figure.axes) <= 20
+    (ring,) = (line for line in figure.axes[0].lines if line.get_markersize() > 10)
+    kits = [line for line in lines if line["entry"] == "domes, 6.4 mm" and line["family"] != "all"]
+    assert ring.get_ydata()[0] == pytest.approx(100 * max(float(line["wrong"]) for line in kits))
 
 
 def test_what_is_never_felt_is_drawn_as_never():

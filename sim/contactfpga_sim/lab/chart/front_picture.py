@@ -32,6 +32,8 @@ class Row(NamedTuple):
     mark: str
     entries: Mapping[str, str]
     """Entries by the words at their marks."""
+    spot: tuple[float, float] = (6, 0)
+    """Offset of the words from their mark, in points."""
 
 
 def _pitches(name: str) -> dict[str, str]:
@@ -39,15 +41,14 @@ def _pitches(name: str) -> dict[str, str]:
 
 
 ROWS = {
-    "domes of 0.4 N, by pitch in mm": Row(style.BLUE, "o", _pitches("domes")),
+    "domes of 0.4 N, by pitch in mm": Row(style.BLUE, "o", _pitches("domes"), (0, 9)),
     "domes at 6.4 mm, by force": Row(
-        style.PURPLE, "s", {f"{force} N": f"domes of {force} N, 6.4 mm" for force in ("0.2", "0.6", "1")}
+        style.PURPLE, "s", {f"{force} N": f"domes of {force} N, 6.4 mm" for force in ("0.2", "0.6", "1")}, (0, -10)
     ),
     "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level")),
-    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels")),
-    "other sensors at 6.4 mm (model)": Row(
-        style.BROWN, "v", {"array": "analog array", "MCU": "microcontroller", "OpenCV": "OpenCV"}
-    ),
+    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0)),
+    "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (0, -10)),
+    "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (0, -20)),
 }
 FOREIGN = Row(style.BLACK, "*", {})
 """Entries that are not ours, under their own names."""
@@ -62,24 +63,28 @@ class Panel(NamedTuple):
 
 
 PANELS = (
-    Panel("scenes with a wrong count, %", "wrong", 100.0, (1, 10, 100), (0.7, 130)),
-    Panel("error of place, mm", "place_mm", 1.0, (0.2, 0.5, 1, 2, 5, 10, 20), (0.2, 25)),
+    Panel("scenes with a wrong count, %", "wrong", 100.0, (2, 5, 10, 20, 50, 100), (1.5, 150)),
+    Panel("error of place, mm", "place_mm", 1.0, (0.2, 0.5, 1, 2, 5), (0.2, 6)),
 )
-TICKS_MS, ENDS_MS = (5, 10, 20, 50, 100), (3.2, 150)
+TICKS_MS, ENDS_MS = (5, 10, 20, 30), (5, 36)
 BITS_MS = 19 * 10 / 3e3
 """Milliseconds that the bits of the shortest frame with a zone need at 3 Mbaud."""
+
+
+ENOUGH = 30
+"""Scenes with a right count from which a family's error of place counts."""
 
 
 class Spot(NamedTuple):
     """An entry in a panel."""
 
     late_ms: float
-    """Median of the slowest family."""
+    """Median of all scenes."""
     worst: float
-    mean: float
     low: float
     high: float
-    """Of the worst family, and its 95 % interval; over all scenes."""
+    mean: float
+    """Of the worst family, with its 95 % interval, and of all scenes."""
 
 
 Lines = Sequence[dict[str, str]]
@@ -91,11 +96,13 @@ def spot(lines: Lines, panel: Panel) -> Spot:
     def value(line: dict[str, str], end: str = "") -> float:
         return panel.factor * float(line[panel.field + end])
 
-    of = [line for line in lines if line["family"] != "all" and math.isfinite(value(line))]
-    worst = max(of, key=value)
+    def right(line: dict[str, str]) -> float:
+        return int(line["scenes"]) * (1 - float(line["wrong"])) if panel.field == "place_mm" else math.inf
+
+    of = [line for line in lines if line["family"] != "all" and right(line) >= ENOUGH]
+    worst = max(of or lines, key=value)
     every = max((line for line in lines if line["family"] == "all"), key=value)
-    late = max(float(line["median_s"]) for line in lines if line["family"] != "all")
-    return Spot(1e3 * late, value(worst), value(every), value(worst, "_low"), value(worst, "_high"))
+    return Spot(1e3 * float(every["median_s"]), value(worst), value(worst, "_low"), value(worst, "_high"), value(every))
 
 
 def save(scores: Path, path: Path) -> Path:
@@ -117,7 +124,7 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
             _row(axes, panel, row, by, words=panel is PANELS[0] or row is foreign)
         at = spot(by[KITS], panel)
         axes.plot(at.late_ms, at.worst, "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
-    axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of the slowest family (without USB)")
+    axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
     marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
     marks += [Line2D([], [], color=style.INK, marker="o", mfc="none", ls="", ms=11)]
@@ -144,7 +151,7 @@ def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool
         axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
         axes.plot(at.late_ms, max(at.mean, panel.ends[0]), "_", color=row.color, ms=7, zorder=3)
         if words:
-            axes.annotate(
-                word, (at.late_ms, at.worst), (6, 0), textcoords="offset points", va="center", fontsize=style.SMALL
-            )
+            side = "left" if row.spot[0] > 0 else "right" if row.spot[0] else "center"
+            place = {"xytext": row.spot, "textcoords": "offset points", "ha": side, "va": "center"}
+            axes.annotate(word, (at.late_ms, at.worst), fontsize=style.SMALL, **place)
     axes.plot([at.late_ms for at in spots.values()], [at.worst for at in spots.values()], color=row.color, lw=1)
