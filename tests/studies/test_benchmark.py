@@ -19,9 +19,8 @@ from scipy.optimize import linear_sum_assignment
 
 from contactfpga.tools import cli
 from contactfpga_sim.apps import score, stats
-from contactfpga_sim.apps.covers import sheet
 from contactfpga_sim.lab.benchmark import entries, scenes
-from contactfpga_sim.lab.benchmark.scenes import FAMILIES, PITCHES_MM, Work
+from contactfpga_sim.lab.benchmark.scenes import PITCHES_MM, Work
 from contactfpga_sim.lab.chart import front_picture
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -199,10 +198,3 @@ def test_the_command_scores_and_draws_entries_of_others(folder, mine, tmp_path, 
     marks = {tuple(line.get_xydata()[0].round(6)) for line in top.lines if line.get_marker() == "*"}
     assert marks == {(10.0, 100.0)}
     assert cli.main(["study", "benchmark", "--scenes", str(tmp_path), "-o", str(tmp_path / "out")]) == 1
-
-
-def test_sheets_of_the_files_are_those_of_the_page():
-    page = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
-    for pitch in PITCHES_MM:
-        assert f"{sheet(pitch).rows} x {sheet(pitch).columns}" in page
-    assert all(f"`{family}.npz`" in page for family in FAMILIES)

@@ -22,7 +22,7 @@ from contactfpga_sim.apps.errors import Blob
 from contactfpga_sim.lab.benchmark import entries
 from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
+from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.levels.tables import SCORES
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
@@ -253,17 +253,6 @@ def test_a_quantile_of_few_values_or_of_some_that_never_come_has_no_upper_end():
     felt = [float(value) for value in range(180)]
     assert math.isinf(stats.quantile([*felt, *[math.inf] * 20], 0.95).value)
     assert stats.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
-
-
-def test_what_to_build_miscounts_least_over_all_families_and_has_a_cover():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    shares = {
-        method: np.mean([one.errors["total"]["miscounted"].mean for one in points if one.task.method == method])
-        for method in SHEETS
-    }
-    build = compute.to_build(points)
-    assert METHODS[build].cover is not None
-    assert shares[build] == min(share for name, share in shares.items() if METHODS[name].cover)
 
 
 @pytest.mark.slow

@@ -218,13 +218,3 @@ def in_all(points: Sequence[Point]) -> list[str]:
     families = {point.task.family for point in points}
     counts = Counter(point.task.method for point in points)
     return [method for method, count in counts.items() if count == len(families)]
-
-
-def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the least mean share of miscounted scenes of all families; the first of equals."""
-    shares: dict[str, list[float]] = {}
-    methods = in_all(points)
-    for point in points:
-        if covered(point.task) and point.task.method in methods:
-            shares.setdefault(point.task.method, []).append(point.errors["total"]["miscounted"].mean)
-    return min(shares, key=lambda method: float(np.mean(shares[method])), default="")

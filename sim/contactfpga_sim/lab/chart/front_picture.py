@@ -1,4 +1,4 @@
-"""The README's picture: time from the touch to the last byte against wrong counts and errors of place.
+"""The chart's first picture: time from the touch to the last byte against wrong counts and errors of place.
 
 Its points are the scores of the benchmark's entries, by the model under which an entry counts worse.
 """
