@@ -64,9 +64,10 @@ class Sensed:
         return np.where(touched > rest, touched, 0)
 
 
-def places(read: np.ndarray, pitch_mm: float, lasts: int = 1) -> np.ndarray:
-    """(k, 2) x and y in mm, from the sheet's corner, of the contacts in a map of levels."""
-    sums = levels.moments(read, levels.label(read, 4, lasts))
+def places(read: np.ndarray, pitch_mm: float, lasts: int = 1, weights: np.ndarray | None = None) -> np.ndarray:
+    """(k, 2) x and y in mm, from the sheet's corner, of the contacts in a map of levels: barycenters of its layers, or
+    of integer weights of its cells."""
+    sums = levels.moments(read if weights is None else weights, levels.label(read, 4, lasts))
     return pitch_mm * (sums[:, 2:] / sums[:, 1:2] + 0.5)
 
 
@@ -97,8 +98,7 @@ def analog(forces_n: np.ndarray, pitch_mm: float, seeds: tuple[int, ...]) -> np.
     neighbors = beside[2:, 1:-1] + beside[:-2, 1:-1] + beside[1:-1, 2:] + beside[1:-1, :-2]
     force = (beside[1:-1, 1:-1] + CROSSTALK * neighbors) / FULL_N * RANGE
     steps = np.clip(np.rint(force + NOISE_STEPS * rng.standard_normal(force.shape)), 0, RANGE).astype(int)
-    sums = levels.moments(steps, levels.label((steps >= DOME.force_n / FULL_N * RANGE).astype(int), 4, 1))
-    return pitch_mm * (sums[:, 2:] / sums[:, 1:2] + 0.5)
+    return places((steps >= DOME.force_n / FULL_N * RANGE).astype(int), pitch_mm, weights=steps)
 
 
 # ---- times
