@@ -234,7 +234,8 @@ def quantile(values: np.ndarray, part: float) -> Interval:
     count, half = len(values), Z95 * math.sqrt(part * (1 - part) * len(values))
     ranks = np.ceil([part * count, part * count - half, part * count + half + 1]).astype(int) - 1
     ends = np.concatenate([[0.0], np.sort(values), [math.inf]])[np.clip(ranks + 1, 0, count + 1)]
-    return Interval(*ends.tolist(), count)
+    value, low, high = ends.tolist()
+    return Interval(value, low, high, count)
 
 
 def write(path: str | Path, found: Iterable[tuple[Entry, Scores]]) -> None:

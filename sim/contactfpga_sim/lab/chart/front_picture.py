@@ -25,6 +25,9 @@ KITS = "domes, 6.4 mm"
 """What both kits are."""
 
 
+Offset = tuple[float, float]
+
+
 class Row(NamedTuple):
     """Entries that differ in one setting."""
 
@@ -32,8 +35,9 @@ class Row(NamedTuple):
     mark: str
     entries: Mapping[str, str]
     """Entries by the words at their marks."""
-    spot: tuple[float, float] = (6, 0)
-    """Offset of the words from their mark, in points."""
+    spot: Offset = (6, 0)
+    others: Mapping[str, Offset] = {}
+    """Offset of the words from their mark, in points, and that of some words."""
 
 
 def _pitches(name: str) -> dict[str, str]:
@@ -43,12 +47,16 @@ def _pitches(name: str) -> dict[str, str]:
 ROWS = {
     "domes of 0.4 N, by pitch in mm": Row(style.BLUE, "o", _pitches("domes"), (0, 9)),
     "domes at 6.4 mm, by force": Row(
-        style.PURPLE, "s", {f"{force} N": f"domes of {force} N, 6.4 mm" for force in ("0.2", "0.6", "1")}, (0, -10)
+        style.PURPLE,
+        "s",
+        {f"{force} N": f"domes of {force} N, 6.4 mm" for force in ("0.2", "0.6", "1")},
+        (1, -10),
+        {"0.2 N": (0, 9)},
     ),
-    "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level")),
-    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0)),
-    "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (0, -10)),
-    "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (0, -20)),
+    "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level"), others={"4": (-5, -4)}),
+    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10)}),
+    "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (-2, -10)),
+    "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (1, -20)),
 }
 FOREIGN = Row(style.BLACK, "*", {})
 """Entries that are not ours, under their own names."""
@@ -90,7 +98,7 @@ class Spot(NamedTuple):
 Lines = Sequence[dict[str, str]]
 
 
-def spot(lines: Lines, panel: Panel) -> Spot:
+def placed(lines: Lines, panel: Panel) -> Spot:
     """Where the lines of an entry's scores stand in a panel."""
 
     def value(line: dict[str, str], end: str = "") -> float:
@@ -122,7 +130,7 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
         _axes(axes, panel)
         for row in (*ROWS.values(), foreign):
             _row(axes, panel, row, by, words=panel is PANELS[0] or row is foreign)
-        at = spot(by[KITS], panel)
+        at = placed(by[KITS], panel)
         axes.plot(at.late_ms, at.worst, "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
     axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
@@ -145,13 +153,14 @@ def _axes(axes: Any, panel: Panel) -> None:
 
 
 def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool) -> None:
-    spots = {word: spot(by[entry], panel) for word, entry in row.entries.items() if entry in by}
+    spots = {word: placed(by[entry], panel) for word, entry in row.entries.items() if entry in by}
     for word, at in spots.items():
         axes.plot([at.late_ms] * 2, [at.low, at.high], color=row.color, lw=0.8, alpha=0.5)
         axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
         axes.plot(at.late_ms, max(at.mean, panel.ends[0]), "_", color=row.color, ms=7, zorder=3)
         if words:
-            side = "left" if row.spot[0] > 0 else "right" if row.spot[0] else "center"
-            place = {"xytext": row.spot, "textcoords": "offset points", "ha": side, "va": "center"}
+            spot = row.others.get(word, row.spot)
+            side = "left" if spot[0] > 0 else "right" if spot[0] else "center"
+            place = {"xytext": spot, "textcoords": "offset points", "ha": side, "va": "center"}
             axes.annotate(word, (at.late_ms, at.worst), fontsize=style.SMALL, **place)
     axes.plot([at.late_ms for at in spots.values()], [at.worst for at in spots.values()], color=row.color, lw=1)
