@@ -44,8 +44,14 @@ def entries_table(found: Found) -> writer.Table:
         every = scores["all", MODELS[-1]]
         late = f"{1e3 * every.median_s.mean:.1f} / {1e3 * every.late_s.mean:.1f} ms"
         named = f"{entry.name} (model)" if entry.kind == "model" else entry.name
-        rows.append([named, *shares, f"{every.place_mm.mean:.2f} mm", late])
-    return writer.Table(head, rows)
+        rows.append([named, *shares, f"{every.place_mm.mean:.2f} mm", late.replace("inf", "never")])
+    shown = (front_picture.KITS, "three levels, 5 mm", "three levels, 6.4 mm", "one level, 5 mm")
+    return writer.Table(
+        head,
+        rows,
+        lambda row: row[0] in shown or "(model)" in row[0],
+        before=f"{scores[families[0], MODELS[0]].wrong.count} scenes per family:",
+    )
 
 
 def levels_table(found: Found) -> writer.Table:
