@@ -116,7 +116,7 @@ def test_the_pages_example_is_scored_by_the_file_alone(folder, tmp_path):
 def mine(folder):
     """Arrays of results with one contact at (80, 80) in each scene."""
     place = {f"{family}_{model}": np.full((COUNT, 1, 2), 80.0) for family in ("pair", "edge") for model in score.MODELS}
-    late = {f"{family}_seconds": np.full(COUNT, 0.01) for family in ("pair", "edge")}
+    late = {f"{family}_seconds": np.full(COUNT, 0.003) for family in ("pair", "edge")}
     return {"name": np.array("mine"), "kind": np.array("model"), "pitch_mm": np.array(6.4)} | place | late
 
 
@@ -196,5 +196,6 @@ def test_the_command_scores_and_draws_entries_of_others(folder, mine, tmp_path, 
     assert {line["entry"] for line in lines} == {*entries.METHODS, "mine"}
     top, _ = front_picture.picture(lines).axes
     marks = {tuple(line.get_xydata()[0].round(6)) for line in top.lines if line.get_marker() == "*"}
-    assert marks == {(10.0, 100.0)}
+    assert marks == {(3.0, 100.0)}
+    assert top.get_xlim()[0] < 3.0
     assert cli.main(["study", "benchmark", "--scenes", str(tmp_path), "-o", str(tmp_path / "out")]) == 1

@@ -110,7 +110,9 @@ def placed(lines: Lines, panel: Panel) -> Spot:
     of = [line for line in lines if line["family"] != "all" and right(line) >= ENOUGH]
     worst = max(of or lines, key=value)
     every = max((line for line in lines if line["family"] == "all"), key=value)
-    return Spot(1e3 * float(every["median_s"]), value(worst), value(worst, "_low"), value(worst, "_high"), value(every))
+    late = min(1e3 * float(every["median_s"]), ENDS_MS[1])  # which also stands for never
+    found = (value(worst), value(worst, "_low"), value(worst, "_high"), value(every))
+    return Spot(late, *(max(one, panel.ends[0]) for one in found))  # which also stands for none
 
 
 def save(scores: Path, path: Path) -> Path:
@@ -157,10 +159,11 @@ def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool
     for word, at in spots.items():
         axes.plot([at.late_ms] * 2, [at.low, at.high], color=row.color, lw=0.8, alpha=0.5)
         axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
-        axes.plot(at.late_ms, max(at.mean, panel.ends[0]), "_", color=row.color, ms=7, zorder=3)
+        axes.plot(at.late_ms, at.mean, "_", color=row.color, ms=7, zorder=3)
         if words:
             spot = row.others.get(word, row.spot)
             side = "left" if spot[0] > 0 else "right" if spot[0] else "center"
             place = {"xytext": spot, "textcoords": "offset points", "ha": side, "va": "center"}
             axes.annotate(word, (at.late_ms, at.worst), fontsize=style.SMALL, **place)
+        axes.set_xlim(min(axes.get_xlim()[0], 0.8 * at.late_ms or ENDS_MS[0]), ENDS_MS[1])
     axes.plot([at.late_ms for at in spots.values()], [at.worst for at in spots.values()], color=row.color, lw=1)
