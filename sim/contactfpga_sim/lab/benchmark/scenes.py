@@ -37,14 +37,14 @@ Arrays = dict[str, np.ndarray]
 
 
 class Work(NamedTuple):
-    """Scenes ``first`` to ``first + count`` of a family under one model."""
+    """``number`` scenes of a family, from ``first`` on, under one model."""
 
     pitch_mm: float
     model: str
     family: str
     seed: int
     first: int
-    count: int
+    number: int
 
 
 def cover_of(skin: Skin) -> Cover:
@@ -88,7 +88,7 @@ def padded(found: Sequence[np.ndarray]) -> np.ndarray:
 
 def drawn(work: Work) -> list[Pressed]:
     skin = sheet(work.pitch_mm)
-    scenes = placements(work.family, work.count, work.seed, skin, work.first)
+    scenes = placements(work.family, work.number, work.seed, skin, work.first)
     return [pressed_by(work.model, one, skin) for one in scenes]
 
 
@@ -97,7 +97,7 @@ def rising(work: Work) -> np.ndarray:
     skin, found = sheet(work.pitch_mm), []
     cover, pitch = cover_of(skin), skin.pitch_x_mm * 1e-3
     cells = cells_of(cover, skin.rows, skin.columns, pitch, pitch)
-    for one in touches(work.family, work.count, work.seed, skin, cover, work.first):
+    for one in touches(work.family, work.number, work.seed, skin, cover, work.first):
         seconds = one.settled_s * np.linspace(0, 1, STEPS + 1) ** 2
         most = [float(cells.forces_n(one.loads(at)).max()) for at in seconds.tolist()]
         found.append([seconds, np.maximum.accumulate(most)])

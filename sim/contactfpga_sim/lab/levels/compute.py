@@ -127,7 +127,7 @@ def compute() -> Found:
         best = {pitch: fitted(pitch, workers) for pitch in scenes.PITCHES_MM}
         designs = [(pitch, reading) for pitch, readings in best.items() for reading in readings]
         methods = {str(one): entries.light(one[0], one[1].forces_n, one[1].lasts) for one in designs}
-        found = entries.judged(methods | entries.METHODS, Path(name), workers)
+        found = entries.judged({**methods, **entries.METHODS}, Path(name), workers)
         return Found([Judged(*one, found.pop(0)[1]) for one in designs], found)
 
 
