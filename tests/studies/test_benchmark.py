@@ -199,3 +199,6 @@ def test_the_command_scores_and_draws_entries_of_others(folder, mine, tmp_path, 
     assert marks == {(3.0, 100.0)}
     assert top.get_xlim()[0] < 3.0
     assert cli.main(["study", "benchmark", "--scenes", str(tmp_path), "-o", str(tmp_path / "out")]) == 1
+    np.savez(tmp_path / "mine.npz", **mine | {"name": np.array("OpenCV")})
+    assert cli.main(["study", "benchmark", *given]) == 1
+    assert "two entries have the name 'OpenCV'" in capsys.readouterr().err

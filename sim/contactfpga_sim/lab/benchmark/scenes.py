@@ -26,8 +26,8 @@ from contactfpga_sim.model.scenes.truth import truth_of
 
 FAMILIES = ("bumper", "fingers", "pair", "palm", "edge")
 PITCHES_MM = (4.0, 5.0, 6.4, 8.0)
-COUNT, MOST, PIECE = 400, 1000, 25
-"""Usual and largest number of scenes of a family, and scenes per piece of work."""
+COUNT, PIECE = 400, 25
+"""Usual number of scenes of a family, and scenes per piece of work."""
 SEED, OTHERS = 2, 1
 """Seed of the scenes that judge, and of those to choose a method with."""
 STEPS = 40

@@ -30,7 +30,7 @@ def draw(folder: Path) -> Path:
 
 
 def entries_table(found: Found) -> writer.Table:
-    """The benchmark's entries, by the model under which each counts worse."""
+    """The benchmark's entries: wrong counts in the worst family by each model, places and times of all."""
     head = [
         "entry",
         *(f"worst family, {model}" for model in MODELS),

@@ -34,6 +34,9 @@ def run(args: argparse.Namespace) -> int:
             if not args.scenes:
                 print(*scenes.write(drawn, args.seed, args.placements, workers), sep="\n", flush=True)
             given = [score.load(path, drawn) for path in args.entry or ()]  # refused before the work begins
+            names = [*entries.METHODS, *(entry.name for entry, _ in given)]
+            if twice := [name for name in names if names.count(name) > 1]:
+                raise ContactFPGAError(f"two entries have the name {twice[0]!r}; give yours another one")
             found = entries.judged(entries.METHODS, drawn, workers)
     except score.ScoreError as error:
         raise ContactFPGAError(str(error)) from None
