@@ -89,16 +89,16 @@ SETTINGS: dict[str, Any] = {
 """matplotlib settings for drawing and saving; equal input gives an equal file."""
 
 
-def new(height_in: float) -> Figure:
-    """A figure of the page's width on a card, whose parts make room for one another."""
+def new(height_in: float, width_in: float = WIDTH_IN) -> Figure:
+    """A figure on a card, by default of the page's width, whose parts make room for one another."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.patches import FancyBboxPatch
 
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
+    figure = Figure(figsize=(width_in, height_in), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
     rounded = f"round,pad=0,rounding_size={8 / 96}"
     card = FancyBboxPatch(
-        (0, 0), WIDTH_IN, height_in, boxstyle=rounded, transform=figure.dpi_scale_trans, fc=CARD, ec="none", zorder=-10
+        (0, 0), width_in, height_in, boxstyle=rounded, transform=figure.dpi_scale_trans, fc=CARD, ec="none", zorder=-10
     )
     card.set_in_layout(False)
     figure.add_artist(card)

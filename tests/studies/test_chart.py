@@ -17,11 +17,13 @@ from study_pages import outdated
 from contactfpga.design.cover import BODIES, Cells
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.apps import errors, result_cache, speed, stats
+from contactfpga_sim.apps import errors, result_cache, score, speed, stats
 from contactfpga_sim.apps.errors import Blob
+from contactfpga_sim.lab.benchmark import entries
 from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
+from contactfpga_sim.lab.chart.methods import METHODS
+from contactfpga_sim.lab.levels.tables import SCORES
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -64,7 +66,7 @@ def test_found_and_there_are_paired_at_the_least_total_distance():
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 1000), (1, 1000), (500, 1000), (7, 7)])
 def test_shares_have_wilsons_interval(hits, count):
-    got = stats.interval([1.0] * hits + [0.0] * (count - hits))
+    got = score.interval([1.0] * hits + [0.0] * (count - hits))
     want = binomtest(hits, count).proportion_ci(method="wilson")
     assert (got.mean, got.low, got.high) == pytest.approx((hits / count, want.low, want.high), abs=1e-12)
 
@@ -73,7 +75,7 @@ def test_the_interval_of_a_mean_holds_it_95_times_of_100():
     rng = np.random.default_rng(5)
     inside = 0
     for _ in range(1000):
-        got = stats.interval(rng.exponential(2.0, 400).tolist())
+        got = score.interval(rng.exponential(2.0, 400).tolist())
         inside += got.low <= 2.0 <= got.high
     assert 925 <= inside <= 970
 
@@ -253,17 +255,6 @@ def test_a_quantile_of_few_values_or_of_some_that_never_come_has_no_upper_end():
     assert stats.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
 
 
-def test_what_to_build_miscounts_least_over_all_families_and_has_a_cover():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    shares = {
-        method: np.mean([one.errors["total"]["miscounted"].mean for one in points if one.task.method == method])
-        for method in SHEETS
-    }
-    build = compute.to_build(points)
-    assert METHODS[build].cover is not None
-    assert shares[build] == min(share for name, share in shares.items() if METHODS[name].cover)
-
-
 @pytest.mark.slow
 def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
@@ -322,23 +313,27 @@ def test_the_page_shows_what_its_numbers_say(tmp_path):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
 
 
-def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    axes, _ = front_picture.picture(points).axes
-    left, right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
-    shown = [method for row in front_picture.ROWS.values() for method in row.methods.values()]
-    assert len(marks) == len(shown) == len(set(shown))
-    for line in csv.DictReader((ROOT / tables.NUMBERS).read_text(encoding="utf-8").splitlines()):
-        if line["family"] == "fingers" and line["method"] in shown:
-            x, y = float(line["touch_median_us"]) + float(line["host_us"]), 100 * float(line["total_miscounted"])
-            assert any((x, y) == pytest.approx(mark) for mark in marks), line["method"]
-            assert left < x < right
-            assert bottom < y < top
-            fast = (line["method"].startswith("reversal"), 24_000_000, 12_000_000)
-            skin = METHODS[line["method"]].skin
-            assert ((skin.clock_hz, skin.baud) == fast[1:]) == fast[0]  # as the legend says
+def test_the_picture_of_the_front_has_its_entries_where_their_scores_say():
+    """Each panel by the worst family and the mean of the worse model, and the kits in a ring."""
+    with open(ROOT / SCORES, newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    figure = front_picture.picture(lines)
+    for axes, field, factor in zip(figure.axes, ("wrong", "place_mm"), (100, 1), strict=True):
+        marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
+        left, right, bottom, top = *axes.get_xlim(), *axes.get_ylim()
+        for entry in entries.METHODS:
+            of = [line for line in lines if line["entry"] == entry]
+            (x,) = {1e3 * float(line["median_s"]) for line in of if line["family"] == "all"}
+            counted = [one for one in of if field == "wrong" or int(one["scenes"]) * (1 - float(one["wrong"])) >= 30]
+            for family in ({"all"}, set(FAMILIES_DRAWN)):
+                y = factor * max(float(line[field]) for line in counted if line["family"] in family)
+                assert any((x, max(y, bottom)) == pytest.approx(mark) for mark in marks), (entry, field)
+                assert left < x < right
+                assert y < top
+    assert sum(len(axes.texts) - 1 for axes in figure.axes) <= 20
+    (ring,) = (line for line in figure.axes[0].lines if line.get_markersize() > 10)
+    kits = [line for line in lines if line["entry"] == "domes, 6.4 mm" and line["family"] != "all"]
+    assert ring.get_ydata()[0] == pytest.approx(100 * max(float(line["wrong"]) for line in kits))
 
 
 def test_what_is_never_felt_is_drawn_as_never():

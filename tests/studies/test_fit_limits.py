@@ -17,8 +17,8 @@ from contactfpga_sim.apps.fit.candidates import METHODS, candidates, pitches_for
 from contactfpga_sim.apps.fit.faces import Protection, faces
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals, Measurement
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.apps.speed import Speed
-from contactfpga_sim.apps.stats import Interval
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from contactfpga.design.cover import BODIES, Cover
-from contactfpga_sim.apps.stats import Interval
-from contactfpga_sim.lab.chart.methods import sheet
+from contactfpga_sim.apps.covers import FOAM_M, sheet
+from contactfpga_sim.apps.score import MODELS, Interval, Score
+from contactfpga_sim.lab.benchmark import entries, scenes
+from contactfpga_sim.lab.benchmark.entries import Reading, Sensed
+from contactfpga_sim.lab.benchmark.pressed import FOAM_MM, Contact, flesh, pressed, tiles
+from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.cover.elements import touching
 from contactfpga_sim.lab.levels import compute, tables
-from contactfpga_sim.lab.levels.compute import FAMILIES, MODELS, Judged, Outcome, Reading, Sensed
-from contactfpga_sim.lab.levels.pressed import FOAM_MM, Contact, Pressed, flesh, pressed, tiles
+from contactfpga_sim.lab.levels.compute import Judged
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.families import placements
 from contactfpga_sim.model.scenes.scene import Scene
@@ -57,7 +60,7 @@ def test_a_light_touch_is_that_of_a_dense_solution(body):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_cells_carry_each_body(family):
     (scene,) = placements(family, 1, 4, SKIN)
-    found, model = pressed(scene, SKIN), compute.modeled(scene, SKIN)
+    found, model = pressed(scene, SKIN), scenes.pressed_by("model", scene, SKIN)
     assert found.forces_n.sum() == pytest.approx(sum(contact.force_n for contact in scene.contacts), rel=1e-6)
     assert len(found.joined) == len(model.contacts)
     for one, other in zip(
@@ -74,28 +77,11 @@ def test_gaps_narrower_than_the_foam_may_join():
     """Two fingers, by the distance of their pressed rims."""
     for gap in np.arange(7.0, 13.0, 0.5):
         scene = Scene(contacts.pair(gap, 6.0, 80.0, 75.0, force_n=10.0))
-        found = compute.modeled(scene, SKIN)
+        found = scenes.pressed_by("model", scene, SKIN)
         one, other = sorted(found.contacts, key=lambda one: one.x_mm)
         between = other.x_mm - one.x_mm - 2 * math.sqrt(one.area_mm2 / math.pi)
-        assert len(found.joined) == (1 if between < 1e3 * compute.FOAM_M else 2), gap
+        assert len(found.joined) == (1 if between < 1e3 * FOAM_M else 2), gap
     assert len({len(pressed(Scene(contacts.pair(gap, 6.0, 80.0, 75.0)), SKIN).joined) for gap in (4.0, 13.0)}) == 2
-
-
-def test_either_count_is_right_across_a_narrow_gap():
-    forces = np.zeros((SKIN.rows, SKIN.columns))
-    forces[3, 3:5], forces[3, 6:8] = 1.0, 1.0
-    there = [compute.Blob(82.0, at * PITCH_MM, 3 * PITCH_MM) for at in (3.5, 6.5, 12.0)]
-
-    def read(contacts, joined):
-        still = Sensed(forces, 1)
-        return compute.outcome(still, Reading((0.2,)), Pressed(forces, contacts, joined), SKIN)
-
-    assert read(there[:2], there[:2]) == (False, False, pytest.approx(0, abs=0.01))
-    assert read(there, there[:2])[:2] == (False, True)
-    assert read(there, there[:1])[:2] == (False, True)
-    assert math.isnan(read(there, there[:1]).place_mm)  # which of the three are two is unknown
-    assert read(there, there)[:2] == (True, True)
-    assert read(there[:1], there[:1])[:2] == (True, True)
 
 
 # ---- cells
@@ -105,7 +91,7 @@ def test_an_untouched_sheet_reads_nothing_however_old_its_preload(monkeypatch):
     """Without the guard some sheets do."""
     reading, rest = Reading((0.05, 0.2)), np.zeros((40, 40))
     assert not any(Sensed(rest, seed).levels(reading).any() for seed in range(100))
-    monkeypatch.setattr(compute, "GUARD", 1.0)
+    monkeypatch.setattr(entries, "GUARD", 1.0)
     assert any(Sensed(rest, seed).levels(reading).any() for seed in range(100))
 
 
@@ -123,7 +109,7 @@ def test_the_choice_is_the_least_of_the_worst_families():
     readings = (Reading((0.1,)), Reading((0.2,)), Reading((0.1, 0.4)), Reading((0.1, 0.8)))
 
     def piece(*wrong, place=1.0):
-        return [[Outcome(one, one, math.nan if one else place - 0.1 * at) for at, one in enumerate(wrong)]]
+        return [[(one, one, math.nan if one else place - 0.1 * at) for at, one in enumerate(wrong)]]
 
     even = piece(0, 0, 0, 0)
     assert compute.choices(readings, ["pair", "palm", "palm"], [piece(1, 0, 1, 1), piece(0, 1, 1, 0), even]) == (
@@ -134,21 +120,22 @@ def test_the_choice_is_the_least_of_the_worst_families():
 
 
 def judged(pitch_mm, count, low, high):
-    share = dict.fromkeys(((model, family) for model in MODELS for family in FAMILIES), Interval(0, 0, 0, 400))
-    share["elements", "palm"] = share["model", "pair"] = Interval((low + high) / 2, low, high, 400)
-    return Judged(pitch_mm, Reading(tuple(0.1 * 4.0**level for level in range(count))), share, share, share)
+    best, worst = Interval(0, 0, 0, 400), Interval((low + high) / 2, low, high, 400)
+    scores = {(family, model): Score(*[best] * 5) for model in MODELS for family in (*FAMILIES, "all")}
+    scores["palm", "elements"] = scores["pair", "model"] = Score(worst, *[best] * 4)
+    return Judged(pitch_mm, Reading(tuple(0.1 * 4.0**level for level in range(count))), scores)
 
 
 def test_levels_win_beyond_the_intervals_alone():
     assert judged(5.0, 3, 0.1, 0.2).beats(judged(5.0, 1, 0.21, 0.3))
     assert not judged(5.0, 3, 0.1, 0.2).beats(judged(5.0, 1, 0.19, 0.3))
     one_model = judged(5.0, 3, 0.1, 0.2)
-    one_model.wrong["elements", "edge"] = Interval(0.5, 0.4, 0.6, 400)
+    one_model.scores["edge", "elements"] = Score(*[Interval(0.5, 0.4, 0.6, 400)] * 5)
     assert not one_model.beats(judged(5.0, 1, 0.21, 0.3))
 
 
 def test_rivals_cost_no_more():
-    found = [judged(pitch, count, 0.1, 0.2) for pitch in compute.PITCHES_MM for count in (1, 2, 3, 4)]
+    found = [judged(pitch, count, 0.1, 0.2) for pitch in scenes.PITCHES_MM for count in (1, 2, 3, 4)]
     pairs = tables.rivals(found)
     places = [(three.pitch_mm, one.pitch_mm) for three, one in pairs]
     assert places == [(4, 4), (5, 5), (5, 4), (6.4, 6.4), (6.4, 5), (8, 8), (8, 6.4)]

@@ -1,10 +1,12 @@
-"""The studies' covers, of parts that one can buy or cut; none was built."""
+"""The studies' covers, of parts that one can buy or cut, and their sheets, of one extent; none was built."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from contactfpga.design.cover import Cap, Cover, Switch
+from contactfpga.skin import Skin
 
 GAP_MM = 0.6
 
@@ -41,3 +43,15 @@ COVERS: dict[str, Callable[[float], Cover | None]] = {
     "tiles": tiled,
 }
 """Covers by name, as functions of pitch in mm."""
+
+EXTENT_MM = 160.0
+
+MOST_ZONES = 32
+"""Zones per frame, enough here; more would need longer row times on the finest sheets."""
+
+
+def sheet(pitch_mm: float, **settings: Any) -> Skin:
+    """A square sheet of :data:`EXTENT_MM`, by default 4-connected."""
+    lines = round(EXTENT_MM / pitch_mm)
+    given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
+    return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)

@@ -1,4 +1,4 @@
-"""Intervals of shares, means and quantiles, and a sequential test: it draws until they decide."""
+"""Intervals of quantiles, and a sequential test: it draws until shares decide."""
 
 from __future__ import annotations
 
@@ -11,22 +11,12 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import binom
 
-Z95 = 1.959963984540054
+from contactfpga_sim.apps.score import Z95, wilson
 
 ENOUGH = 30
 """Values whose mean counts as normally distributed."""
 
 Draw = TypeVar("Draw")
-
-
-@dataclasses.dataclass(frozen=True)
-class Interval:
-    """A mean with its 95 % interval."""
-
-    mean: float
-    low: float
-    high: float
-    count: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,27 +42,6 @@ class Rate:
         """Whether the share reaches this level; None while the interval contains it."""
         low, high = self.interval(z)
         return True if low >= level else False if high < level else None
-
-
-def wilson(hits: int, of: int, z: float = Z95) -> tuple[float, float]:
-    """Wilson's interval of a share, by default of 95 %."""
-    share, part = hits / of, z * z / of
-    middle = (share + part / 2) / (1 + part)
-    half = z * math.sqrt(share * (1 - share) / of + part / 4 / of) / (1 + part)
-    return max(0.0, middle - half), min(1.0, middle + half)
-
-
-def interval(values: Sequence[float]) -> Interval:
-    """Interval of values without NaN: normal, or Wilson's for shares 0 or 1."""
-    known = np.array([value for value in values if not math.isnan(value)], float)
-    n = len(known)
-    if not n:
-        return Interval(math.nan, math.nan, math.nan, 0)
-    mean = float(known.mean())
-    if np.isin(known, (0.0, 1.0)).all():
-        return Interval(mean, *wilson(int(known.sum()), n), n)
-    half = Z95 * float(known.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
-    return Interval(mean, mean - half, mean + half, n)
 
 
 def quantile(values: Sequence[float], share: float) -> Quantile:

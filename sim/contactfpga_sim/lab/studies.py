@@ -147,8 +147,9 @@ _ALL = (
         title="One level of force and several, read by the host",
         page="levels.md",
         minutes=4,
-        sections=tables("levels verdict places"),
-        compute="compute:compute",
+        sections=tables("levels verdict places", entries=Section("tables:entries_table", page="benchmark.md")),
+        compute="tables:compute",
+        pictures="tables:draw",
         extra="chart",
     ),
     Study(

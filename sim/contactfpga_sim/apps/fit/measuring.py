@@ -16,8 +16,8 @@ from contactfpga_sim.apps.errors import METRICS, Look
 from contactfpga_sim.apps.fit import faces
 from contactfpga_sim.apps.fit.sources import RecordingSource, Source
 from contactfpga_sim.apps.fit.trial import SHARES, FitTask, Goals
+from contactfpga_sim.apps.score import Interval, interval
 from contactfpga_sim.apps.speed import Speed
-from contactfpga_sim.apps.stats import Interval, interval
 
 FIRST = 20
 """Scenes in the first batch; looks double them."""

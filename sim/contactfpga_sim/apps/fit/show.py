@@ -14,8 +14,8 @@ from contactfpga_sim.apps.errors import METRICS
 from contactfpga_sim.apps.fit.cost import DEVICE
 from contactfpga_sim.apps.fit.sources import RecordingSource
 from contactfpga_sim.apps.fit.trial import Fit, Measurement, Trial
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.apps.speed import Speed
-from contactfpga_sim.apps.stats import Interval
 
 HEADS = ("zones by", "scan", "cover", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
 """Column headings; equal covers and bauds are omitted."""

@@ -12,8 +12,8 @@ from contactfpga.skin import Skin
 from contactfpga_sim.apps.fit.candidates import Candidate
 from contactfpga_sim.apps.fit.faces import TOUCHES
 from contactfpga_sim.apps.fit.sources import Source
+from contactfpga_sim.apps.score import Z95, Interval
 from contactfpga_sim.apps.speed import Speed
-from contactfpga_sim.apps.stats import Z95, Interval
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from contactfpga.design.cover import Cap, Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import covers
-from contactfpga_sim.apps.stats import wilson
+from contactfpga_sim.apps.score import wilson
 from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks

@@ -12,7 +12,7 @@ from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.cover.cell import MATERIALS, read_cell
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
-from contactfpga_sim.apps.stats import wilson
+from contactfpga_sim.apps.score import wilson
 from contactfpga_sim.lab import writer
 from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.board.virtual import VirtualBoard

@@ -15,15 +15,18 @@ from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.apps import errors, result_cache, size, stats
+from contactfpga_sim.apps import errors, result_cache, score, size, stats
 from contactfpga_sim.apps.errors import METRICS
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab.chart import times
 from contactfpga_sim.lab.chart.times import Raw, Times
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
+
+FAMILY = "fingers"
+"""The family that compares all methods."""
 
 PIECE = 100
 
@@ -113,7 +116,7 @@ def study(
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     return {
-        kind: {name: stats.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        kind: {name: score.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
     }
 
@@ -125,7 +128,7 @@ def accuracies(task: Task) -> list[Found]:
     for first in range(0, task.count, PIECE):
         found.append(accuracy(task, first))
         wrong = [value for piece in found for value in piece["total"]["miscounted"]]
-        if stats.interval(wrong).low > BAD:
+        if score.interval(wrong).low > BAD:
             break
     return found
 
@@ -215,13 +218,3 @@ def in_all(points: Sequence[Point]) -> list[str]:
     families = {point.task.family for point in points}
     counts = Counter(point.task.method for point in points)
     return [method for method, count in counts.items() if count == len(families)]
-
-
-def to_build(points: Sequence[Point]) -> str:
-    """The covered method with the least mean share of miscounted scenes of all families; the first of equals."""
-    shares: dict[str, list[float]] = {}
-    methods = in_all(points)
-    for point in points:
-        if covered(point.task) and point.task.method in methods:
-            shares.setdefault(point.task.method, []).append(point.errors["total"]["miscounted"].mean)
-    return min(shares, key=lambda method: float(np.mean(shares[method])), default="")

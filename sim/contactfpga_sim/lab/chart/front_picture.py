@@ -1,11 +1,13 @@
-"""The README's picture: covers, pitches and closing forces.
+"""The chart's first picture: time from the touch to the last byte against wrong counts and errors of place.
 
-Labellers, reports and rates that change little are only in the table.
+Its points are the scores of the benchmark's entries, by the model under which an entry counts worse.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,144 +17,153 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga_sim.lab.chart import picture as chart
-from contactfpga_sim.lab.chart.compute import Point, reached_us, to_build
 
-FAMILY = "fingers"
+WIDTH_IN = 390 / 96
+"""A phone's width, so that nobody has to scroll."""
+
+KITS = "domes, 6.4 mm"
+"""What both kits are."""
 
 
-Spot = tuple[float, float]
-"""Offset of words from their mark, in points."""
+Offset = tuple[float, float]
 
 
 class Row(NamedTuple):
-    """Methods that differ in one setting."""
+    """Entries that differ in one setting."""
 
     color: str
     mark: str
-    methods: dict[str, str]
-    """Methods by the words at their marks."""
-    spot: Spot = (8, 0)
-    others: dict[tuple[str, str], Spot | None] = {}  # noqa: RUF012 - it is not changed
-    """Offsets by words and error in place of ``spot``; None: no words."""
+    entries: Mapping[str, str]
+    """Entries by the words at their marks."""
+    spot: Offset = (6, 0)
+    others: Mapping[str, Offset] = {}
+    """Offset of the words from their mark, in points, and that of some words."""
+
+
+def _pitches(name: str) -> dict[str, str]:
+    return {pitch: f"{name}, {pitch} mm" for pitch in ("8", "6.4", "5", "4")}
 
 
 ROWS = {
-    "foam cut into tiles, domes of 0.4 N, 12 MHz and 3 Mbaud": Row(
-        style.BLUE,
-        "o",
-        {f"{pitch} mm": f"run, {pitch} mm, tiles" for pitch in ("20", "10", "8", "6.4", "5")},
-        (-7, 0),
-        {("6.4 mm", "barycenter_mm"): (-6, 10)},
-    ),
-    "the same by line reversal, 24 MHz and 12 Mbaud": Row(
-        style.GREEN,
-        "x",
-        {f"x{pitch}": f"reversal, {pitch} mm, tiles" for pitch in ("10", "6.4", "5")},
-        others={
-            (f"x{pitch}", error): None for pitch in ("10", "6.4", "5") for error in ("miscounted", "barycenter_mm")
-        },
-    ),
-    "tiles 6.4 mm apart, domes of another force": Row(
+    "domes of 0.4 N, by pitch in mm": Row(style.BLUE, "o", _pitches("domes"), (0, 9)),
+    "domes at 6.4 mm, by force": Row(
         style.PURPLE,
         "s",
-        {f"{force} N": f"run, 6.4 mm, tiles, {force} N" for force in ("0.2", "0.6", "1")},
-        others={
-            ("0.2 N", "miscounted"): (-10, 0),
-            ("0.6 N", "miscounted"): (7, -4),
-            ("0.2 N", "barycenter_mm"): (-10, -4),
-            ("0.6 N", "barycenter_mm"): (3, -10),
-        },
+        {f"{force} N": f"domes of {force} N, 6.4 mm" for force in ("0.2", "0.6", "1")},
+        (1, -10),
+        {"0.2 N": (0, 9)},
     ),
-    "one whole foam": Row(
-        style.ORANGE,
-        "^",
-        {f"{pitch} mm": f"run, {pitch} mm, caps" for pitch in ("10", "6.4")},
-        others={("6.4 mm", "barycenter_mm"): None},
-    ),
-    "switch and foam of the paper": Row(
-        style.VERMILLION,
-        "D",
-        {f"{pitch} mm": f"run, {pitch} mm, paper" for pitch in ("10", "6.4")},
-        (-8, 0),
-        {("10 mm", "miscounted"): (-8, -13), ("10 mm", "barycenter_mm"): (6, 11)},
-    ),
-    "no cover: a limit that nobody can build": Row(
-        style.GRAY, "v", {f"{pitch} mm": f"run, {pitch} mm, bare" for pitch in ("10", "6.4")}
-    ),
+    "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level"), others={"4": (-5, -4)}),
+    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10)}),
+    "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (-2, -10)),
+    "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (1, -20)),
 }
-
-TICKS_US = {100: "0.1", 1000: "1", 10_000: "10", 100_000: "100"}
-ENDS_US = (80.0, 300_000.0)
+FOREIGN = Row(style.BLACK, "*", {})
+"""Entries that are not ours, under their own names."""
 
 
 class Panel(NamedTuple):
-    name: str
     label: str
+    field: str
     factor: float
     ticks: tuple[float, ...]
     ends: tuple[float, float]
 
 
 PANELS = (
-    Panel("miscounted", "scenes with a wrong count, %", 100.0, (0.1, 1, 10, 100), (0.03, 150)),
-    Panel("barycenter_mm", "mean error of the barycenters found, mm", 1.0, (0.5, 1, 2, 5), (0.5, 7)),
+    Panel("scenes with a wrong count, %", "wrong", 100.0, (2, 5, 10, 20, 50, 100), (1.5, 150)),
+    Panel("error of place, mm", "place_mm", 1.0, (0.2, 0.5, 1, 2, 5), (0.2, 6)),
 )
+TICKS_MS, ENDS_MS = (5, 10, 20, 30), (5, 36)
+BITS_MS = 19 * 10 / 3e3
+"""Milliseconds that the bits of the shortest frame with a zone need at 3 Mbaud."""
 
 
-def save(points: Sequence[Point], path: Path) -> Path:
-    """Draw the points of :data:`FAMILY`; equal points give equal files."""
-    with matplotlib.rc_context(style.SETTINGS):
-        return style.save(picture(points), path)
+ENOUGH = 30
+"""Scenes with a right count from which a family's error of place counts."""
 
 
-def picture(points: Sequence[Point]) -> Figure:
-    figure = style.new(5.2)
-    method = to_build(points)
-    some = {point.task.method: point for point in points if point.task.family == FAMILY}
-    for axes, panel in zip(figure.subplots(1, len(PANELS)), PANELS, strict=True):
+class Spot(NamedTuple):
+    """An entry in a panel."""
+
+    late_ms: float
+    """Median of all scenes."""
+    worst: float
+    low: float
+    high: float
+    mean: float
+    """Of the worst family, with its 95 % interval, and of all scenes."""
+
+
+Lines = Sequence[dict[str, str]]
+
+
+def placed(lines: Lines, panel: Panel) -> Spot:
+    """Where the lines of an entry's scores stand in a panel."""
+
+    def value(line: dict[str, str], end: str = "") -> float:
+        return panel.factor * float(line[panel.field + end])
+
+    def right(line: dict[str, str]) -> float:
+        return int(line["scenes"]) * (1 - float(line["wrong"])) if panel.field == "place_mm" else math.inf
+
+    of = [line for line in lines if line["family"] != "all" and right(line) >= ENOUGH]
+    worst = max(of or lines, key=value)
+    every = max((line for line in lines if line["family"] == "all"), key=value)
+    late = min(1e3 * float(every["median_s"]), ENDS_MS[1])  # which also stands for never
+    found = (value(worst), value(worst, "_low"), value(worst, "_high"), value(every))
+    return Spot(late, *(max(one, panel.ends[0]) for one in found))  # which also stands for none
+
+
+def save(scores: Path, path: Path) -> Path:
+    """Draw scores as :func:`contactfpga_sim.apps.score.write` writes them; equal scores give equal files."""
+    with open(scores, newline="", encoding="utf-8") as file, matplotlib.rc_context(style.SETTINGS):
+        return style.save(picture(csv.DictReader(file)), path)
+
+
+def picture(lines: Iterable[dict[str, str]]) -> Figure:
+    by: dict[str, list[dict[str, str]]] = {}
+    for line in lines:
+        by.setdefault(line["entry"], []).append(line)
+    ours = {entry for row in ROWS.values() for entry in row.entries.values()}
+    foreign = FOREIGN._replace(entries={entry: entry for entry in by if entry not in ours})
+    figure = style.new(8.2, WIDTH_IN)
+    for axes, panel in zip(figure.subplots(2, 1, sharex=True), PANELS, strict=True):
         _axes(axes, panel)
-        for row in ROWS.values():
-            _row(axes, panel, row, some)
-        _ring(axes, panel, some[method])
-    figure.suptitle(f"Two to five fingers: {title(some[method])}", x=0.02, ha="left", fontsize=style.LARGE)
+        for row in (*ROWS.values(), foreign):
+            _row(axes, panel, row, by, words=panel is PANELS[0] or row is foreign)
+        at = placed(by[KITS], panel)
+        axes.plot(at.late_ms, at.worst, "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
+    axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
-    figure.legend(marks, list(ROWS), loc="outside lower left", ncols=2)
+    marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
+    marks += [Line2D([], [], color=style.INK, marker="o", mfc="none", ls="", ms=11)]
+    words = [*ROWS, "below a mark: the mean of all families", "what both kits are"]
+    figure.legend(marks, words, loc="outside lower left", ncols=1)
     return figure
 
 
-def title(best: Point) -> str:
-    found = best.errors["total"]["miscounted"]
-    share = f"{100 * found.mean:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f})"
-    return f"the ringed method, {best.task.method}, miscounts {share}"
-
-
 def _axes(axes: Any, panel: Panel) -> None:
-    axes.set(xscale="log", yscale="log", xlim=ENDS_US, ylim=panel.ends, ylabel=panel.label)
-    axes.set_xlabel("first touch of the cover to the last byte\non the wire (without USB), median, ms")
-    axes.set_xticks(list(TICKS_US), TICKS_US.values())
+    axes.set(xscale="log", yscale="log", xlim=ENDS_MS, ylim=panel.ends)
+    axes.set_title(f"{panel.label}, in the worst family", loc="left")
+    axes.set_xticks(TICKS_MS, TICKS_MS)
     axes.set_yticks(panel.ticks, map("{:g}".format, panel.ticks))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_locator(NullLocator())
     axes.grid()
+    axes.text(0.01, 0.02, f"← bits alone: {BITS_MS:.2f} ms", transform=axes.transAxes, fontsize=style.SMALL)
 
 
-def _row(axes: Any, panel: Panel, row: Row, some: dict[str, Point]) -> None:
-    drawn = {words: some[method] for words, method in row.methods.items() if method in some}
-    places = [_place(panel, point) for point in drawn.values()]
-    for (x, y), (words, point) in zip(places, drawn.items(), strict=True):
-        found = point.errors["total"][panel.name]
-        axes.plot([x, x], [panel.factor * found.low, panel.factor * found.high], color=row.color, lw=0.8, alpha=0.5)
-        axes.plot(x, y, row.mark, color=row.color, ms=6, mew=1.4 if row.mark == "x" else 0, zorder=3)
-        if spot := row.others.get((words, panel.name), row.spot):
-            side = "left" if spot[0] > 0 else "right"
-            axes.annotate(words, (x, y), spot, textcoords="offset points", ha=side, va="center", fontsize=style.SMALL)
-    axes.plot(*zip(*places, strict=True), color=row.color, lw=1)
-
-
-def _place(panel: Panel, point: Point) -> tuple[float, float]:
-    return reached_us(point), panel.factor * chart.error(point, panel.name)
-
-
-def _ring(axes: Any, panel: Panel, best: Point) -> None:
-    axes.plot(*_place(panel, best), "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
+def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool) -> None:
+    spots = {word: placed(by[entry], panel) for word, entry in row.entries.items() if entry in by}
+    for word, at in spots.items():
+        axes.plot([at.late_ms] * 2, [at.low, at.high], color=row.color, lw=0.8, alpha=0.5)
+        axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
+        axes.plot(at.late_ms, at.mean, "_", color=row.color, ms=7, zorder=3)
+        if words:
+            spot = row.others.get(word, row.spot)
+            side = "left" if spot[0] > 0 else "right" if spot[0] else "center"
+            place = {"xytext": spot, "textcoords": "offset points", "ha": side, "va": "center"}
+            axes.annotate(word, (at.late_ms, at.worst), fontsize=style.SMALL, **place)
+        axes.set_xlim(min(axes.get_xlim()[0], 0.8 * at.late_ms or ENDS_MS[0]), ENDS_MS[1])
+    axes.plot([at.late_ms for at in spots.values()], [at.worst for at in spots.values()], color=row.color, lw=1)

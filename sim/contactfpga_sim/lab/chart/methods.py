@@ -8,9 +8,7 @@ from typing import Any, NamedTuple
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps.covers import COVERS, DOME, tiled
-
-EXTENT_MM = 160.0
+from contactfpga_sim.apps.covers import COVERS, DOME, sheet, tiled
 
 PITCHES_MM = (6.4, 8.0, 10.0, 20.0, 5.0)
 """Pitches; the first compares methods."""
@@ -20,21 +18,11 @@ PITCH_MM = PITCHES_MM[0]
 THRESHOLDS_N = (0.2, 0.6, 1.0)
 """Closing forces besides :data:`contactfpga_sim.apps.covers.DOME`'s 0.4 N."""
 
-MOST_ZONES = 32
-"""Zones per frame, enough here; more would need longer row times on the finest sheets."""
-
 
 class Method(NamedTuple):
     skin: Skin
     cover: Cover | None
     """Cover; None is a bare sheet, whose switches close at any force if their middles are under a contact."""
-
-
-def sheet(pitch_mm: float, **settings: Any) -> Skin:
-    """A square sheet of :data:`EXTENT_MM`, by default 4-connected."""
-    lines = round(EXTENT_MM / pitch_mm)
-    given: dict[str, Any] = {"connectivity": 4, "zone_capacity": MOST_ZONES} | settings
-    return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **given)
 
 
 def under(cover: str, name: str, pitch_mm: float, more: str = "", **settings: Any) -> dict[str, Method]:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from contactfpga.inputs.files import replaced
 from contactfpga_sim.apps.errors import METRICS
-from contactfpga_sim.apps.stats import Interval, Quantile
+from contactfpga_sim.apps.score import Interval
+from contactfpga_sim.apps.stats import Quantile
 from contactfpga_sim.lab.chart.compute import KINDS, Point, Task
 from contactfpga_sim.lab.chart.methods import METHODS, Method
 from contactfpga_sim.lab.chart.times import Times

@@ -10,11 +10,12 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import pool, speed
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps.score import Interval
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.chart import front_picture, host, numbers, times_picture
+from contactfpga_sim.lab.chart import host, numbers, times_picture
 from contactfpga_sim.lab.chart.compute import (
     FAMILIES_DRAWN,
+    FAMILY,
     Point,
     Task,
     covered,
@@ -22,7 +23,6 @@ from contactfpga_sim.lab.chart.compute import (
     in_all,
     reached_us,
     study,
-    to_build,
 )
 from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
 
@@ -39,7 +39,7 @@ def compute() -> list[Point]:
         Task(name, *method, family, PLACEMENTS, 0)
         for family in FAMILIES_DRAWN
         for name, method in METHODS.items()
-        if family == front_picture.FAMILY or name in SHEETS
+        if family == FAMILY or name in SHEETS
     ]
     with pool.executor() as executor, pool.progress() as step:
         points = study(tasks, executor, True, step)
@@ -48,11 +48,11 @@ def compute() -> list[Point]:
 
 
 def draw(folder: Path, points: list[Point]) -> list[Path]:
-    times = times_picture.save(points, folder.parent / "chart" / "times.svg")
-    return [times, front_picture.save(points, folder / "front.svg")]
+    return [times_picture.save(points, folder.parent / "chart" / "times.svg")]
 
 
 COMPARED = [f"{name}, 6.4 mm, tiles" for name in ("run", "serial", "projection", "cells", "reversal")]
+KITS = COMPARED[0]
 COVERS = [f"run, 6.4 mm, {cover}" for cover in ("tiles", "caps", "paper")]
 """Rows that the page shows of all methods, and of all families."""
 
@@ -68,25 +68,23 @@ HEAD = (
 
 
 def front_table(points: list[Point]) -> writer.Table:
-    """Methods to build, then per family the covered methods that are Pareto-optimal in time and miscounts."""
+    """Per family the kits' design, then the covered methods that are Pareto-optimal in time and miscounts."""
     rows = []
-    method = to_build(points)
     for family in dict.fromkeys(point.task.family for point in points):
         some = [point for point in points if point.task.family == family and covered(point.task)]
         best = front([(reached_us(point), point.errors["total"]["miscounted"].mean) for point in some])
-        shown = [point for point in some if point.task.method == method]
+        shown = [point for point in some if point.task.method == KITS]
         shown += [some[index] for index in best if some[index] not in shown]
-        rows += [(family, _name(point, method), *_cells(point)) for point in shown]
+        rows += [(family, _name(point), *_cells(point)) for point in shown]
     columns = ("family", HEAD[0], "miscounted", "barycenter of found")
     return writer.Table(("family", "method", *HEAD), rows, lambda row: row[1].startswith("**"), columns)
 
 
 def methods_table(points: list[Point]) -> writer.Table:
-    method = to_build(points)
-    some = [point for point in points if point.task.family == front_picture.FAMILY]
-    rows = [(_name(point, method), *_cells(point), f"{point.luts:,}" if point.luts else "") for point in some]
+    some = [point for point in points if point.task.family == FAMILY]
+    rows = [(_name(point), *_cells(point), f"{point.luts:,}" if point.luts else "") for point in some]
     columns = ("method", HEAD[0], "electronics alone", "miscounted", "barycenter of found", "LUT4")
-    return writer.Table(("method", *HEAD, "LUT4"), rows, lambda row: row[0] in COMPARED, columns)
+    return writer.Table(("method", *HEAD, "LUT4"), rows, lambda row: row[0].strip("*") in COMPARED, columns)
 
 
 def families_table(points: list[Point]) -> writer.Table:
@@ -99,12 +97,12 @@ def families_table(points: list[Point]) -> writer.Table:
         found = [point.errors["total"] for point in some]
         shares = [f"{_percent(one['miscounted'])}; {100 * one['missed'].mean:.1f} %" for one in found]
         alike = (some[0].task.skin.pitch_x_mm, some[0].task.cover, *shares)
-        rows.setdefault(alike, (_name(some[0], to_build(points)), *shares))
-    return writer.Table(("miscounted; missed", *families), list(rows.values()), lambda row: row[0] in COVERS)
+        rows.setdefault(alike, (_name(some[0]), *shares))
+    return writer.Table(("miscounted; missed", *families), list(rows.values()), lambda row: row[0].strip("*") in COVERS)
 
 
-def _name(point: Point, build: str) -> str:
-    return f"**{point.task.method}**" if point.task.method == build else point.task.method
+def _name(point: Point) -> str:
+    return f"**{point.task.method}**" if point.task.method == KITS else point.task.method
 
 
 def _cells(point: Point) -> tuple[str, ...]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import speed, stats
-from contactfpga_sim.apps.stats import Interval, Quantile
+from contactfpga_sim.apps import score, speed, stats
+from contactfpga_sim.apps.score import Interval
+from contactfpga_sim.apps.stats import Quantile
 from contactfpga_sim.model.scenes.scene import Scene
 
 HALVINGS = 14
@@ -95,7 +96,7 @@ def summed(pieces: Sequence[Raw], skin: Skin) -> Times:
         stats.quantile(touch, 0.95),
         stats.quantile(closed, 0.5),
         stats.quantile(closed, 0.95),
-        stats.interval([float(math.isinf(value)) for value in touch]),
+        score.interval([float(math.isinf(value)) for value in touch]),
         usual,
         usual * 10 * skin.derived.bit_clocks * 1e6 / skin.clock_hz,
     )

@@ -14,8 +14,7 @@ from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
 from contactfpga_sim.apps.stats import Quantile
-from contactfpga_sim.lab.chart.compute import Point, covered
-from contactfpga_sim.lab.chart.front_picture import FAMILY
+from contactfpga_sim.lab.chart.compute import FAMILY, Point, covered
 from contactfpga_sim.lab.chart.picture import NEVER_US, TIMES_US
 
 PARTS = {

@@ -15,7 +15,8 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim.apps import result_cache, size
-from contactfpga_sim.apps.stats import drawn, wilson
+from contactfpga_sim.apps.score import wilson
+from contactfpga_sim.apps.stats import drawn
 from contactfpga_sim.lab.flips import flip
 from contactfpga_sim.lab.flips.flip import FlipOutcome
 from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ, Reference

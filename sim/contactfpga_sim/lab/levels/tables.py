@@ -1,18 +1,60 @@
-"""Tables of docs/levels.md."""
+"""Tables of docs/levels.md and docs/benchmark.md, and the picture of the benchmark's entries."""
 
 from __future__ import annotations
 
-import itertools
+from pathlib import Path
 
-from contactfpga_sim.apps.stats import Interval
+from contactfpga_sim.apps import score
+from contactfpga_sim.apps.score import MODELS, Interval
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.levels.compute import FAMILIES, MODELS, Judged
+from contactfpga_sim.lab.benchmark.scenes import FAMILIES
+from contactfpga_sim.lab.chart import front_picture
+from contactfpga_sim.lab.levels.compute import Found, Judged
+from contactfpga_sim.lab.levels.compute import compute as study
 
 SHOWN = ("1", "3")
 """Numbers of levels that the page shows: those of a map with one and with two bits a cell."""
 
 
-def levels_table(found: list[Judged]) -> writer.Table:
+SCORES = Path("docs/chart/benchmark.csv")
+
+
+def compute() -> Found:
+    found = study()
+    score.write(SCORES, found.entries)
+    return found
+
+
+def draw(folder: Path) -> Path:
+    return front_picture.save(SCORES, folder / "front.svg")
+
+
+def entries_table(found: Found) -> writer.Table:
+    """The benchmark's entries: wrong counts in the worst family by each model, places and times of all."""
+    head = [
+        "entry",
+        *(f"worst family, {model}" for model in MODELS),
+        "place, elements",
+        "touch to last byte, median / 95 %",
+    ]
+    rows = []
+    for entry, scores in found.entries:
+        families = [score.worst(scores, model) for model in MODELS]
+        shares = [f"{family} {_share(scores[family, model].wrong)}" for family, model in zip(families, MODELS)]
+        every = scores["all", MODELS[-1]]
+        late = f"{1e3 * every.median_s.mean:.1f} / {1e3 * every.late_s.mean:.1f} ms"
+        named = f"{entry.name} (model)" if entry.kind == "model" else entry.name
+        rows.append([named, *shares, f"{every.place_mm.mean:.2f} mm", late.replace("inf", "never")])
+    shown = (front_picture.KITS, "three levels, 5 mm", "three levels, 6.4 mm", "one level, 5 mm")
+    return writer.Table(
+        head,
+        rows,
+        lambda row: row[0] in shown or "(model)" in row[0],
+        before=f"{scores[families[0], MODELS[0]].wrong.count} scenes per family:",
+    )
+
+
+def levels_table(found: Found) -> writer.Table:
     """Wrong counts of each design, the worst family first."""
     head = ["pitch", "levels", "forces", "wires", "map", "row", *(f"worst family, {model}" for model in MODELS)]
     more = [f"{family}, {model}" for model in MODELS for family in FAMILIES]
@@ -22,27 +64,31 @@ def levels_table(found: list[Judged]) -> writer.Table:
             *_design(one),
             *(f"{family} {_share(share)}" for family, share in map(one.worst, MODELS)),
             str(one.reading.lasts),
-            *(_share(share) for shares in (one.wrong, one.apart) for share in shares.values()),
+            *(_share(one.scores[family, model].wrong) for model in MODELS for family in FAMILIES),
+            *(_share(one.scores[family, model].apart) for model in MODELS for family in FAMILIES),
         ]
-        for one in found
+        for one in found.designs
     ]
     return writer.Table([*head, "parts last", *more, *strict], rows, lambda row: row[1] in SHOWN, head)
 
 
-def places_table(found: list[Judged]) -> writer.Table:
+def places_table(found: Found) -> writer.Table:
     """Errors of place of the scenes with a right count."""
     head = ["pitch", "levels", *(f"{family}, elements" for family in FAMILIES)]
     rows = [
-        [*_design(one)[:2], *(f"{one.place_mm[key].mean:.2f} mm" for key in itertools.product(MODELS[::-1], FAMILIES))]
-        for one in found
+        [
+            *_design(one)[:2],
+            *(f"{one.scores[family, model].place_mm.mean:.2f} mm" for model in MODELS[::-1] for family in FAMILIES),
+        ]
+        for one in found.designs
     ]
     return writer.Table([*head, *(f"{family}, model" for family in FAMILIES)], rows, lambda row: row[1] in SHOWN, head)
 
 
-def verdict_table(found: list[Judged]) -> str:
+def verdict_table(found: Found) -> str:
     """Three levels beside one level that costs no more."""
     head = ["three levels", "one level", "cost of the one", *(f"worst family, {model}" for model in MODELS), "better"]
-    return writer.table_of([head, *(_verdict(three, one) for three, one in rivals(found))])
+    return writer.table_of([head, *(_verdict(three, one) for three, one in rivals(found.designs))])
 
 
 def rivals(found: list[Judged]) -> list[tuple[Judged, Judged]]:

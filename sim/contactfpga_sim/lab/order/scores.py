@@ -25,7 +25,7 @@ from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.apps import places, pool
 from contactfpga_sim.apps.places import Place
-from contactfpga_sim.apps.stats import Z95
+from contactfpga_sim.apps.score import Z95
 from contactfpga_sim.lab.tracking.scenes import zones_of
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.families import APPROACH_MM_S, placements
