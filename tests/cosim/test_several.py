@@ -25,6 +25,7 @@ from contactfpga_sim.model.board.compiled import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.request import request
+from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for
 
@@ -36,11 +37,19 @@ SMALL = Several(
         Skin(rows=3, columns=2, settle_us=3.0, report="cells", diodes="row2col", row_order=(2, 0, 1), **FAST),
     )
 )
+SAFE = REGISTERS | {"clock_hz": 1_000_000, "baud": 250_000, "guard": True, "alive": True, "fail_safe": True}
+GUARDED = Several(
+    (
+        Skin(rows=2, columns=3, settle_us=40.0, labeller="single", mask=((1, 0), (1, 1), (1, 2)), **SAFE),
+        Skin(rows=3, columns=2, settle_us=30.0, report="cells", diodes="row2col", column_chains=2, **SAFE),
+        Skin(rows=2, columns=2, settle_us=30.0, send="on_change", column_order=(1, 0), **SAFE | {"guard": False}),
+    )
+)
 EXAMPLE = examples() / "two-sheets.toml"
 
 
 def timelines(several, cycles, seed=0, received=()):
-    """Random cells and stuck columns that come and go."""
+    """Random cells, stuck columns and, with guard lines, cut ones that come and go."""
     rng = np.random.default_rng(seed)
     found = []
     for skin in several.skins:
@@ -53,8 +62,16 @@ def timelines(several, cycles, seed=0, received=()):
             )
             for start in starts
         ]
-        found.append(Timeline(pieces, received))
+        cuts = [(int(start) + 100, rng.choice(CUTS)(skin)) for start in starts[::4]] if skin.guard else []
+        found.append(Timeline(pieces, received, cuts))
     return found
+
+
+def unplugged(skin):
+    return Cuts(dict.fromkeys(range(skin.row_lines), 0))
+
+
+CUTS = (lambda skin: Cuts(), unplugged, lambda skin: Cuts({1: 1}, {0: 2}), lambda skin: Cuts({skin.rows: 1}))
 
 
 def asked(cycles, sheets, bit_clocks, seed=0):
@@ -92,6 +109,16 @@ def check(several, lines, cycles, limit_s=60.0):
 
 def test_gateware_and_model_agree_cycle_for_cycle():
     check(SMALL, timelines(SMALL, 2_400, received=asked(2_400, 2, 2)), 2_400)
+
+
+def test_guard_lines_alive_and_fail_safe_of_each_sheet():
+    """The gateware's fault reports on the shared line, and pins `alive` and `contact`, are the model's in each clock."""
+    lines = timelines(GUARDED, 12_000, 3, asked(12_000, 3, 4, 5))
+    want = check(GUARDED, lines, 12_000)
+    for skin, trace, talk in zip(GUARDED.skins, want, heard(want), strict=True):
+        assert len(trace.alive) > 2
+        assert talk.stats.damaged.total() == 0
+        assert talk.stats.fault_reports > 2 * skin.guard
 
 
 def test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant(monkeypatch):
