@@ -8,7 +8,10 @@ import itertools
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga.skin.several import Several
+from contactfpga.skin.several import MOST_SHEETS, Several
+from contactfpga.wire.faults import digits_of, fault_bits
+from contactfpga.wire.protocol import encode_hello
+from contactfpga.wire.sheet_number import NUMBER_BYTES, SheetPlace
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
@@ -66,6 +69,26 @@ def _longest_wait(trace: Trace, begins: list[int]) -> int:
     rows = np.array([cycle for cycle, _, last in trace.rows if last])
     newest = np.searchsorted(rows, np.array(begins)) - 1
     return int(max(np.array(begins) - rows[newest]))
+
+
+def told_clocks(several: Several, number: int) -> int:
+    """Most clocks from pulling a sheet off until its report is on the wire, unless the host asks for hellos.
+
+    A slot passes until the next check, then the report's digits are compared. The sheet may just have taken a packet,
+    and another one goes before the report; before and after that one each other sheet may send a packet.
+    """
+    skin = several.skins[number]
+    known = skin.derived.row_clocks + skin.derived.column_shift_clocks + 3
+    report = 7 + digits_of(fault_bits(skin.rows, skin.columns, skin.guard, skin.self_test)) + NUMBER_BYTES
+    packets = [_longest(one, place) for place, one in enumerate(several.skins)]
+    on_the_line = 2 * sum(packets) + report
+    return known + 2 * (report + 2) + on_the_line * 10 * skin.derived.bit_clocks
+
+
+def _longest(skin: Skin, number: int) -> int:
+    """Bytes of a sheet's longest packet."""
+    hello = encode_hello(skin, place=SheetPlace(number, MOST_SHEETS))
+    return max(len(hello), skin.derived.max_frame_bytes) + NUMBER_BYTES
 
 
 def line_sample() -> str:
