@@ -119,5 +119,5 @@ def test_one_of_two_sheets_is_named_and_the_other_goes_on(rng):
                 look(rng.randrange(400, 12_000))
             board.plug(1, True)
             plugged = board.cycle
-            while not look(100, lambda event: isinstance(event, Run) and not event[-1].faults):
+            while not look(100, lambda event: isinstance(event, Run) and not list(event)[-1].faults):
                 assert board.cycle - plugged < RETRY_US * 4 + 3 * frame + told_clocks(SHEETS, 1)
