@@ -116,9 +116,27 @@ def test_guard_lines_alive_and_fail_safe_of_each_sheet():
     """The gateware's fault reports on the shared line, and pins `alive` and `contact`, are the model's in each clock."""
     want = check(GUARDED, timelines(GUARDED, 9_000, 3, [(6_000, request(9, True, 2, b"\x02\xb1"))]), 9_000)
     for skin, trace, talk in zip(GUARDED.skins, want, heard(want), strict=True):
-        assert len(trace.alive) >= (3 if skin.guard else 8)
+        assert len(trace.alive) >= (3 if skin.guard else 6)
         assert talk.stats.damaged.total() == 0
         assert talk.stats.fault_reports >= 2 * skin.guard
+
+
+def test_a_sheet_that_is_pulled_off_raises_contact_in_a_slot_and_stops_its_alive(rng):
+    """`alive` of the others goes on. Each row is checked in its slot."""
+    derived = GUARDED.skins[1].derived
+    for _ in range(5):
+        pulled = 4_000 + rng.randrange(derived.frame_clocks)
+        lines = [
+            Timeline([], cuts=[(pulled, unplugged(skin))] if skin.guard and skin.rows == 3 else [])
+            for skin in GUARDED.skins
+        ]
+        first, second, third = predict_several(GUARDED.skins, lines, 9_000)
+        ((at, level),) = first.contact
+        assert level
+        assert 0 < at - pulled <= derived.row_clocks + derived.column_shift_clocks + 5
+        assert 3 <= len(second.alive) <= 4
+        assert second.alive[-1][0] <= at
+        assert len(first.alive) == len(third.alive) == 8
 
 
 def test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant(monkeypatch):
