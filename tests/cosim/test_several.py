@@ -113,7 +113,7 @@ def test_gateware_and_model_agree_cycle_for_cycle():
 
 
 def test_guard_lines_alive_and_fail_safe_of_each_sheet():
-    """The gateware's fault reports on the shared line, and pins `alive` and `contact`, are the model's in each clock."""
+    """Fault reports on the shared line, and the pins `alive` and `contact`, are the golden model's in each clock."""
     want = check(GUARDED, timelines(GUARDED, 9_000, 3, [(6_000, request(9, True, 2, b"\x02\xb1"))]), 9_000)
     for skin, trace, talk in zip(GUARDED.skins, want, heard(want), strict=True):
         assert len(trace.alive) >= (3 if skin.guard else 6)

@@ -80,7 +80,10 @@ class Sim:
 
 
 SIM_OPTIONS = tuple(field.name for field in dataclasses.fields(Sim))
-_SIM_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER, &units=FILE, &unplug=SECONDS and &pace=1 where wanted"
+_SIM_FORM = (
+    "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER, &units=FILE, &unplug=SECONDS and &pace=1 where "
+    "wanted"
+)
 _ESCAPES = "a % that is meant is written %25, a & %26"
 
 

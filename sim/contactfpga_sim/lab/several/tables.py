@@ -120,11 +120,11 @@ def known_clocks(skin: Skin) -> int:
 def told_clocks(several: Several, number: int) -> int:
     """Most clocks from pulling a sheet off until its report is received, unless the host asks for hellos.
 
-    From the clock in which the fault is known, the report's digits are compared. The sheet may just have taken a packet,
-    and another one goes before the report; before and after that one each other sheet may send a packet.
+    From the clock in which the fault is known, the report's digits are compared. The sheet may just have taken a
+    packet, and another one goes before the report; before and after that one each other sheet may send a packet.
     """
     skin = several.skins[number]
-    report = 7 + digits_of(fault_bits(skin.rows, skin.columns, skin.guard, skin.self_test)) + NUMBER_BYTES
+    report = 6 + digits_of(fault_bits(skin.rows, skin.columns, skin.guard, skin.self_test)) + NUMBER_BYTES
     packets = [_longest(one, place) for place, one in enumerate(several.skins)]
     on_the_line = 2 * sum(packets) + report
     return known_clocks(skin) + 2 * (report + 2) + on_the_line * 10 * skin.derived.bit_clocks

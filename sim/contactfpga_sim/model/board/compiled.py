@@ -335,7 +335,8 @@ def sheets_model(several: Several) -> native.Model:
 
 
 def _sheet_entry(number: int, skin: Skin) -> str:
-    sizes = (number, skin.rows, skin.columns, int(skin.guard), skin.row_chains, skin.column_chains, int(skin.selects_low))
+    flags = int(skin.guard), skin.row_chains, skin.column_chains, int(skin.selects_low)
+    sizes = (number, skin.rows, skin.columns, *flags)
     lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
     return f"SHEET({', '.join((*map(str, sizes), *lines))})"
 

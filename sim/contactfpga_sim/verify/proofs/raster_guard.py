@@ -31,9 +31,9 @@ def silent_lines(proof: Proof, diodes: Diodes) -> None:
 
     Claimed: a row that did not read the guard column in its slot is reported one clock after its strobe, likewise a
     column that the guard row did not read; the frame's tag has it two clocks after its last strobe, so a frame in
-    which the guard column was not read with any row has the flag, as does one whose columns were not read. It stays reported
-    until it answers in a round that renews. A line that answered in all of its slots is never reported, nor is a fully
-    masked row.
+    which the guard column was not read with some row, or a column was not read by the guard row, has the flag. A line
+    stays reported until it answers in a round that renews. A line that answered in all of its slots is never reported,
+    nor is a fully masked row.
     """
     m, skin = proof.m, skin_of(diodes)
     dut = Scanner(skin)

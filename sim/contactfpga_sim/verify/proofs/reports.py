@@ -25,8 +25,9 @@ def reports_are_true(proof: Proof, skin: Skin, place_of: SheetPlace | None = Non
     Claimed: the byte at that place follows the word in the clock after the byte before was taken, and is stable. A
     report has the right length. Without one on the wire, after the word was stable for two clocks more than there are
     places, it is the last sent word or a report is due; after a hello one is due, too, until it is taken. Of two
-    reports without a hello between them the second does not precede a frame that waited while the first was taken. So it is for one of several sheets, too,
-    whose grants are free, but stay while they are held.
+    reports without a hello between them the second does not precede a frame that waited while the first was taken.
+
+    Free for one of several sheets: its grants. Assumed: a grant stays while it is held.
     """
     m = proof.m
     hello = protocol.encode_hello(skin)
@@ -152,8 +153,12 @@ CASES = (
         "reports are true", "1x1, guard lines", partial(reports_are_true, skin=_sheet(1, 1)), 8, _BUGS, bug_clocks=36
     ),
     ProofCase(
-        "reports are true", "1x1, guard lines, one of two sheets",
-        partial(reports_are_true, skin=_sheet(1, 1), place_of=SheetPlace(1, 2)), 8, _PLACED_BUGS, bug_clocks=36,
+        "reports are true",
+        "1x1, guard lines, one of two sheets",
+        partial(reports_are_true, skin=_sheet(1, 1), place_of=SheetPlace(1, 2)),
+        8,
+        _PLACED_BUGS,
+        bug_clocks=36,
     ),
     ProofCase("reports are true", "2x3, guard lines", partial(reports_are_true, skin=_sheet(2, 3)), 8, campaign=True),
 )
