@@ -41,7 +41,16 @@ SAFE = REGISTERS | {"clock_hz": 1_000_000, "baud": 500_000, "guard": True, "aliv
 GUARDED = Several(
     (
         Skin(rows=2, columns=3, settle_us=40.0, labeller="single", mask=((1, 0), (1, 1), (1, 2)), **SAFE),
-        Skin(rows=3, columns=2, settle_us=30.0, report="cells", diodes="row2col", column_chains=2, **SAFE),
+        Skin(
+            rows=3,
+            columns=2,
+            settle_us=30.0,
+            report="cells",
+            diodes="row2col",
+            column_chains=2,
+            send="on_change",
+            **SAFE,
+        ),
         Skin(rows=2, columns=2, settle_us=30.0, send="on_change", column_order=(1, 0), **SAFE | {"guard": False}),
     )
 )
