@@ -184,6 +184,11 @@ static inline void contactfpga_init(contactfpga_reader *reader);
 /* Take a byte from the board. */
 static inline contactfpga_event contactfpga_push(contactfpga_reader *reader, uint8_t byte);
 
+/* Of a board with several sheets: makes a packet without its delimiter that of a board with its sheet alone, whose reader
+ * takes it with a delimiter; writes the number of the sheet and returns the new length, 0 for a packet of no sheet. Damage
+ * stays damage. */
+static inline size_t contactfpga_of_sheet(uint8_t *packet, size_t length, uint8_t *number);
+
 /* Bytes were lost, or nobody read for more than 8 s: no frame is shown before the next hello, as its time is not known. */
 static inline void contactfpga_doubt(contactfpga_reader *reader);
 
@@ -239,6 +244,7 @@ enum {
     CONTACTFPGA__KIND_UNITS = 8,
     CONTACTFPGA__KIND_FAULTS = 9,
     CONTACTFPGA__KIND_COMMAND = 10,
+    CONTACTFPGA__KIND_NUMBERED = 11,
     CONTACTFPGA__SHEET = 1,
     CONTACTFPGA__STATE = 2,
     CONTACTFPGA__PITCH = 3,
@@ -951,6 +957,22 @@ static inline contactfpga_event contactfpga_push(contactfpga_reader *reader, uin
         reader->damage = false;
     }
     return event;
+}
+
+static inline size_t contactfpga_of_sheet(uint8_t *packet, size_t length, uint8_t *number) {
+    if (length < CONTACTFPGA__CHECK_BYTES + 4) return 0;
+    uint8_t *check = packet + length - CONTACTFPGA__CHECK_BYTES;
+    if (check[-2] != 2 || check[-1] >> 4 != CONTACTFPGA__KIND_NUMBERED) return 0;
+    uint16_t crc = (uint16_t)((check[0] & 0x7F) | (check[1] & 0x7F) << 7 | (check[2] & 3) << 14);
+    for (int place = 1; place <= 2; place++) { /* the CRC before these two bytes, which the ordinary packet lacks */
+        for (int bit = 0; bit < 8; bit++) crc = (uint16_t)(crc & 0x8000 ? (crc ^ 0x8408) << 1 | 1 : crc << 1);
+        crc ^= check[-place];
+    }
+    *number = check[-1] & 0x0F;
+    check[-2] = (uint8_t)((check[0] & 0x80) | (crc & 0x7F)); /* what is wrong besides the CRC stays so */
+    check[-1] = (uint8_t)((check[1] & 0x80) | (crc >> 7 & 0x7F));
+    check[0] = (uint8_t)((check[2] & 0xFC) | crc >> 14);
+    return length - 2;
 }
 
 static inline void contactfpga_init(contactfpga_reader *reader) {

@@ -1,9 +1,12 @@
 /* Reads what a board sent from standard input and writes what it says, an event per line, and the counters at the end.
  *
  *     cc -o decode decode.c && ./decode < recording.bin
+ *
+ * A number as its argument is that of one sheet of a board with several.
  */
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "contactfpga.h"
 
@@ -56,17 +59,36 @@ static void show_faults(const contactfpga_hello *hello) {
     printf(contactfpga_lines_joined(&reader) ? " joined\n" : "\n");
 }
 
-int main(void) {
+static void take(uint8_t byte) {
+    contactfpga_event event = contactfpga_push(&reader, byte);
+    if (event == CONTACTFPGA_HELLO) show_hello(&reader.hello);
+    if (event == CONTACTFPGA_HELLO && reader.hello.units) show_units(&reader.hello);
+    if (event == CONTACTFPGA_SWEEP) show_sweep(&reader.sweep);
+    if (event == CONTACTFPGA_FRAME) show_frame(&reader.frame);
+    if (event == CONTACTFPGA_FAULTS) show_faults(&reader.hello);
+}
+
+/* A byte of a board with several sheets. */
+static void take_of_sheet(uint8_t byte, int sheet) {
+    static uint8_t packet[CONTACTFPGA_PACKET_BYTES + 2], number;
+    static size_t length;
+    if (byte) {
+        if (length < sizeof packet) packet[length++] = byte;
+        return;
+    }
+    size_t own = contactfpga_of_sheet(packet, length, &number);
+    for (size_t i = 0; number == sheet && i < own; i++) take(packet[i]);
+    if (own && number == sheet) take(0);
+    length = 0;
+}
+
+int main(int count, char **words) {
     const contactfpga_stats *stats = &reader.stats;
-    int byte;
+    int byte, sheet = count > 1 ? atoi(words[1]) : -1;
     contactfpga_init(&reader);
     while ((byte = getchar()) != EOF) {
-        contactfpga_event event = contactfpga_push(&reader, (uint8_t)byte);
-        if (event == CONTACTFPGA_HELLO) show_hello(&reader.hello);
-        if (event == CONTACTFPGA_HELLO && reader.hello.units) show_units(&reader.hello);
-        if (event == CONTACTFPGA_SWEEP) show_sweep(&reader.sweep);
-        if (event == CONTACTFPGA_FRAME) show_frame(&reader.frame);
-        if (event == CONTACTFPGA_FAULTS) show_faults(&reader.hello);
+        if (sheet < 0) take((uint8_t)byte);
+        else take_of_sheet((uint8_t)byte, sheet);
     }
     printf("stats");
     printf(" frames=%" PRIu64 " lost=%" PRIu64 " unexplained=%" PRIu32 " overwritten=%" PRIu64, stats->frames,

@@ -9,6 +9,7 @@ from contactfpga import Skin, SkinError, examples
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.skin.several import Several
 from contactfpga.tools.cli import main
+from contactfpga_hdl.board.board_top import SheetsTop
 from contactfpga_hdl.board.build import plan_for
 
 ICEBREAKER = BOARDS["icebreaker"]
@@ -29,6 +30,20 @@ def test_each_wire_has_a_pin_of_its_own_in_the_constraints():
     placed = re.findall(r"^set_io (\S+?)(?:__io|_0__io)?(?:\[0\])? (\w+)", plan.files["contactfpga.pcf"], re.MULTILINE)
     assert len({pin for _, pin in placed}) == len(placed) == 21 + 4  # contact, rx, tx, clock
     assert all(any(name.startswith(port) for name, _ in placed) for port in pins)
+
+
+def test_each_sheet_has_its_alive_and_a_pull_at_its_data():
+    """A sheet with guard lines, one without."""
+    safe = SKIN.replace(guard=True, alive=True)
+    board = BOARDS["ulx3s-12f"]
+    several = Several((safe, SKIN, safe.replace(diodes="row2col")))
+    pins = board.pins(several)
+    assert (pins["alive_0"], pins["alive_2"]) == (board.column_side[-1:], board.column_side[-2:-1])
+    used = [pin for of_port in pins.values() for pin in of_port]
+    assert len(used) == len(set(used)) == 3 * 7 + 2
+    modes = {resource.name: resource.attrs.get("PULLMODE") for resource in SheetsTop(board, several)._resources()}
+    assert [modes[f"column_data_{number}"] for number in range(3)] == ["UP", None, "DOWN"]
+    assert modes["column_clock_0"] is None
 
 
 def test_more_wires_than_pins_are_refused():

@@ -21,8 +21,10 @@ from contactfpga import Skin
 from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin.derived import LONGEST_PACKET
 from contactfpga.wire.faults import Faults, SelfTestSlot
+from contactfpga.wire.framing import SHORTEST_PACKET
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import FLAGS, may_number
+from contactfpga.wire.sheet_number import numbered, sheet_of, unnumbered
 from contactfpga.wire.units import Sweep
 from contactfpga.zones.run import Run
 from contactfpga.zones.units import UnitSamples
@@ -58,8 +60,8 @@ def decoder(request, tmp_path_factory):
     return program
 
 
-def by_c(decoder, data: bytes) -> list[str]:
-    done = subprocess.run([decoder], input=data, capture_output=True, timeout=250, check=False)
+def by_c(decoder, data: bytes, *words: str) -> list[str]:
+    done = subprocess.run([decoder, *words], input=data, capture_output=True, timeout=250, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     return done.stdout.decode().split("\n")[:-1]
 
@@ -307,6 +309,25 @@ def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
             flipped[bit // 8] ^= 1 << bit % 8
             data += head + bytes(flipped) + tail
     assert by_c(decoder, data) == by_python(data)
+
+
+@pytest.mark.parametrize("number", [0, 1, 15])
+def test_packets_of_one_sheet_are_sorted_from_those_of_all(decoder, rng, number):
+    """The driver numbers and sorts the packets of two sheets on a line, with faults and flipped bits."""
+    sheets = {one: History(one) for one in (number, 7)}
+    line, own = b"", b""
+    for _ in range(200):
+        of = rng.choice(list(sheets))
+        for packet in sheets[of].packet().split(b"\0"):
+            if SHORTEST_PACKET <= len(packet) < LONGEST_PACKET:
+                sent = bytearray(numbered(packet, of))
+                if rng.random() < 0.1 and sent[place := rng.randrange(len(sent))] != (flip := 1 << rng.randrange(8)):
+                    sent[place] ^= flip
+                line += bytes(sent) + b"\0"
+                own += unnumbered(bytes(sent)) + b"\0" if sheet_of(bytes(sent)) == number else b""
+    said = by_c(decoder, line, str(number))
+    assert said == by_c(decoder, own)
+    assert sum(one.startswith("frame") for one in said) > 10
 
 
 def test_sweeps_out_of_time_are_counted_and_not_shown(decoder):

@@ -25,6 +25,7 @@ from contactfpga_sim.model.board.compiled import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.request import request
+from contactfpga_sim.model.golden.trace import Cuts
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for
 
@@ -36,25 +37,51 @@ SMALL = Several(
         Skin(rows=3, columns=2, settle_us=3.0, report="cells", diodes="row2col", row_order=(2, 0, 1), **FAST),
     )
 )
+SAFE = REGISTERS | {"clock_hz": 1_000_000, "baud": 500_000, "guard": True, "alive": True, "fail_safe": True}
+GUARDED = Several(
+    (
+        Skin(rows=2, columns=3, settle_us=40.0, labeller="single", mask=((1, 0), (1, 1), (1, 2)), **SAFE),
+        Skin(
+            rows=3,
+            columns=2,
+            settle_us=30.0,
+            report="cells",
+            diodes="row2col",
+            column_chains=2,
+            send="on_change",
+            **SAFE,
+        ),
+        Skin(rows=2, columns=2, settle_us=30.0, send="on_change", column_order=(1, 0), **SAFE | {"guard": False}),
+    )
+)
 EXAMPLE = examples() / "two-sheets.toml"
 
 
 def timelines(several, cycles, seed=0, received=()):
-    """Random cells and stuck columns that come and go."""
+    """Random cells, stuck columns and, with guard lines, cut ones that come and go."""
     rng = np.random.default_rng(seed)
     found = []
     for skin in several.skins:
         starts = np.cumsum(rng.integers(50, 700, size=cycles // 300))
+        whole = cycles // 2 if skin.guard else 0  # a report lasts to the next 65 ms
         pieces = [
             (
                 int(start),
                 rng.random((skin.rows, skin.columns)) < rng.choice([0.1, 0.5]),
-                rng.random(skin.columns) < 0.3 if rng.random() < 0.2 else None,
+                rng.random(skin.columns) < 0.3 if rng.random() < 0.2 and start >= whole else None,
             )
             for start in starts
         ]
-        found.append(Timeline(pieces, received))
+        cuts = [(int(start), rng.choice(CUTS)(skin)) for start in starts[::4] if start >= whole] if skin.guard else []
+        found.append(Timeline(pieces, received, cuts))
     return found
+
+
+def unplugged(skin):
+    return Cuts(dict.fromkeys(range(skin.row_lines), 0))
+
+
+CUTS = (lambda skin: Cuts(), unplugged, lambda skin: Cuts({1: 1}, {0: 2}), lambda skin: Cuts({skin.rows: 1}))
 
 
 def asked(cycles, sheets, bit_clocks, seed=0):
@@ -92,6 +119,33 @@ def check(several, lines, cycles, limit_s=60.0):
 
 def test_gateware_and_model_agree_cycle_for_cycle():
     check(SMALL, timelines(SMALL, 2_400, received=asked(2_400, 2, 2)), 2_400)
+
+
+def test_guard_lines_alive_and_fail_safe_of_each_sheet():
+    """Fault reports on the shared line, and the pins `alive` and `contact`, are the golden model's in each clock."""
+    want = check(GUARDED, timelines(GUARDED, 9_000, 3, [(6_000, request(9, True, 2, b"\x02\xb1"))]), 9_000)
+    for skin, trace, talk in zip(GUARDED.skins, want, heard(want), strict=True):
+        assert len(trace.alive) >= (3 if skin.guard else 6)
+        assert talk.stats.damaged.total() == 0
+        assert talk.stats.fault_reports >= 2 * skin.guard
+
+
+def test_a_sheet_that_is_pulled_off_raises_contact_in_a_slot_and_stops_its_alive(rng):
+    """`alive` of the others goes on. Each row is checked in its slot."""
+    derived = GUARDED.skins[1].derived
+    for _ in range(5):
+        pulled = 4_000 + rng.randrange(derived.frame_clocks)
+        lines = [
+            Timeline([], cuts=[(pulled, unplugged(skin))] if skin.guard and skin.rows == 3 else [])
+            for skin in GUARDED.skins
+        ]
+        first, second, third = predict_several(GUARDED.skins, lines, 9_000)
+        ((at, level),) = first.contact
+        assert level
+        assert 0 < at - pulled <= derived.row_clocks + derived.column_shift_clocks + 5
+        assert 3 <= len(second.alive) <= 4
+        assert second.alive[-1][0] <= at
+        assert len(first.alive) == len(third.alive) == 8
 
 
 def test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant(monkeypatch):

@@ -29,6 +29,8 @@ from contactfpga_sim.model.board.pty_board import PtyBoard
         ("sim://?skin=%C3%BC%20.toml", Sim(skin="ü .toml")),
         ("sim://?scene=a.npy&threshold=-1.5", Sim("a.npy", None, -1.5)),
         ("sim://?pace=0.5", Sim(pace=0.5)),
+        ("sim://?unplug=0.5", Sim(unplug=(0, 0.5))),
+        ("sim://?sheets=a.toml&unplug=1:0", Sim(sheets="a.toml", unplug=(1, 0.0))),
     ],
 )
 def test_an_address_has_one_reading(address, meant):
@@ -45,6 +47,9 @@ def test_an_address_has_one_reading(address, meant):
         ("sim://?skin=", "skin is empty"),
         ("sim://board?skin=a", "it reads sim://"),
         ("sim://?scene=a.npy&threshold=nan", "threshold is 'nan'; it must be a finite number"),
+        ("sim://?unplug=1:2", "unplug is '1:2'; it must be SECONDS, with 0 or more seconds"),
+        ("sim://?sheets=a.toml&unplug=16:2", "unplug is '16:2'; it must be SHEET:SECONDS"),
+        ("sim://?unplug=-1", "unplug is '-1'; it must be SECONDS"),
         ("sim://?pace=0", "pace is '0'; it must be a positive number up to 1e6, 1 for real time"),
     ],
 )

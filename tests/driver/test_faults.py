@@ -51,6 +51,7 @@ class Line:
         (ROW_3 | COLUMN_7 | STUCK_2, ("column 2 stuck", "column 7 open", "row 3 open")),
         (0xFFFF, ("guard column open",)),
         (0xFFFF << 16, ("guard row open",)),
+        (0xFFFF_FFFF, ("all lines open",)),
         (0xFFFE << 16, tuple(sorted(f"column {column} open" for column in range(1, 16)))),
         (1 << 32 + 16, ("guard column stuck",)),
         (JOINED, ("joined lines",)),

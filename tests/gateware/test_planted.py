@@ -131,6 +131,8 @@ FAULTS = {
     "contact is that of two sheets": Fault("several.py", "sheet.contact for sheet in self.sheets",
         "sheet.contact for sheet in self.sheets[:2]",
         "tests/cosim/test_several.py::test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant"),
+    "a report does not keep its grant": Fault("link/link.py", "either | wire.take_report if others", "either if others",
+        "tests/cosim/test_several.py::test_guard_lines_alive_and_fail_safe_of_each_sheet"),
     "a masked switch tells of motion": Fault("scan/reversal_rows.py", "touched.eq(self.read & whole)",
         "touched.eq(self.read)", f"{GATEWARE}/test_reversal_scanner.py"),
     "a part on the upper turn stays on the lower": Fault("label/extent.py", "right[-1] | above", "right[-1]",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from amaranth.build import Attrs, Pins, Platform, Resource, ResourceError, Subsignal
 from amaranth.hdl import Cat, ClockDomain, Const, Elaboratable, Module, Value
 from amaranth.lib import io
-from amaranth.lib.wiring import Out
+from amaranth.lib.wiring import Member, Out
 
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin, SkinError
@@ -40,7 +40,7 @@ class BoardTop(Elaboratable):
     def __init__(self, board: BoardSpec, skin: Skin):
         self.board = board
         self.skin = skin
-        self._sheet = row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
+        self._sheet = _outside(skin)
 
     def _check(self) -> None:
         """Raise SkinError that names the field of the :class:`BoardSpec` with a pin that the platform lacks or that is
@@ -148,6 +148,11 @@ class BoardTop(Elaboratable):
         return resources
 
 
+def _outside(skin: Skin) -> dict[str, Member]:
+    """Ports of a sheet, its converter and ``alive``."""
+    return row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
+
+
 class SheetsTop(BoardTop):
     """A board top for several sheets, whose lines are all on shift registers."""
 
@@ -157,7 +162,7 @@ class SheetsTop(BoardTop):
         self._sheet = {
             f"{name}_{number}": member
             for number, skin in enumerate(several.skins)
-            for name, member in (row_pins(skin) | column_pins(skin)).items()
+            for name, member in _outside(skin).items()
         }
 
     def _core(self) -> SeveralTop:
@@ -165,3 +170,10 @@ class SheetsTop(BoardTop):
 
     def _pins(self) -> dict[str, tuple[str, ...]]:
         return self.board.pins(self.several)
+
+    def _pulls(self, name: str) -> Mapping[str, object]:
+        """With guard lines, a pull to the released level at the data of a sheet that may be unplugged."""
+        port, _, number = name.rpartition("_")
+        skin = self.several.skins[int(number)]
+        pulled = port == "column_data" and skin.guard
+        return self.board.pulls["col2row" if skin.selects_low else "row2col"] if pulled else {}

@@ -265,7 +265,8 @@ class Link(wiring.Component):
                         m.d.comb += ends.eq(1)
                         m.next = "IDLE"
         if self.place is not None:
-            m.d.comb += self.holds.eq(~ends & (~wire.idle | either))
+            taken = either | wire.take_report if others else either
+            m.d.comb += self.holds.eq(~ends & (~wire.idle | taken))
 
     def _closing(self, crc: Value) -> list[Value]:
         """The sheet's number, if any, and the CRC in pieces of seven bits, so that no byte is zero."""

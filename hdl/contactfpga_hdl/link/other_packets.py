@@ -37,6 +37,7 @@ class Reports:
 
     def __init__(self, m: Module, link: wiring.Component, wire: Wire):
         self._wire = wire
+        self._grant = None if link.place is None else link.grant
         self.sent = Signal(name="is_report")
         m.submodules.reporter = self._reporter = reporter = Reporter(link.skin)
         self.byte = reporter.byte
@@ -54,8 +55,14 @@ class Reports:
     def choose(self, m: Module, hello_due: Value, frame_waits: Value) -> Value:
         """Whether a report is next, while the wire is idle."""
         taken = self._wire.take_report
-        m.d.comb += taken.eq(self._reporter.due & ~hello_due & ~(self.sent & frame_waits))
-        m.d.sync += self.sent.eq(taken)
+        due = self._reporter.due & ~hello_due & ~(self.sent & frame_waits)
+        if self._grant is None:
+            m.d.comb += taken.eq(due)
+            m.d.sync += self.sent.eq(taken)
+            return taken
+        m.d.comb += taken.eq(due & self._grant)
+        with m.If(taken | self._wire.take_hello | self._wire.take_frame):  # other sheets may send before
+            m.d.sync += self.sent.eq(taken)
         return taken
 
     def begin(self, end: Signal) -> list:

@@ -131,7 +131,7 @@ class BoardSpec:
 
     @property
     def alive(self) -> str:
-        """Pin of ``alive``; without ``alive`` a pin of the sheet."""
+        """Pin of ``alive``; without ``alive`` a pin of the sheet. Further sheets have the pins before it."""
         return self.column_side[-1]
 
     @property
@@ -143,9 +143,11 @@ class BoardSpec:
         """Pins of each gateware port at the sheet and at the converter, and of ``alive``, lowest bit first; port names
         of several sheets end with the sheet's number."""
         if isinstance(skin, Several):
-            rows_first, columns_first = self.row_side + self.column_side[::-1], self.column_side + self.row_side[::-1]
-            sheets = self._dealt(_of_sheets(skin, row_wires), rows_first)
-            return sheets | self._dealt(_of_sheets(skin, column_wires), columns_first)
+            alive = {f"alive_{number}": 1 for number, one in enumerate(skin.skins) if one.alive}
+            columns = self.column_side[: len(self.column_side) - len(alive)]
+            dealt = self._dealt(_of_sheets(skin, row_wires), self.row_side + columns[::-1])
+            dealt |= self._dealt(_of_sheets(skin, column_wires), columns + self.row_side[::-1])
+            return dealt | self._dealt(alive, self.column_side[::-1])
         columns = self.column_side[:-1] if skin.alive else self.column_side
         ports = unit_ports(skin)
         rows = self.row_side[: len(self.row_side) - len(ports)]
@@ -200,7 +202,7 @@ class BoardSpec:
             )
 
     def _check_sheets(self, several: Several) -> None:
-        wires = [sum({**row_wires(skin), **column_wires(skin)}.values()) for skin in several.skins]
+        wires = [sum({**row_wires(skin), **column_wires(skin)}.values()) + skin.alive for skin in several.skins]
         if sum(wires) > self.lines:
             taken = " + ".join(map(str, wires))
             raise SkinError(

@@ -34,7 +34,8 @@ class Serial:
 
 @dataclasses.dataclass(frozen=True)
 class Sim:
-    """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE&sheets=FILE&pace=NUMBER``, decoded."""
+    """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE&sheets=FILE&unplug=SHEET:SECONDS&pace=NUMBER``,
+    decoded."""
 
     scene: str | None = None
     skin: str | None = None
@@ -43,6 +44,8 @@ class Sim:
     units: str | None = None
     """File of pressure units, pressed by the scene."""
     sheets: str | None = None
+    unplug: tuple[int, float] | None = None
+    """A sheet, and the board's time in s from which it is pulled off; the text has no sheet if there is only one."""
     pace: float | None = None
     """Speed relative to real time; None: time passes only during reads."""
 
@@ -66,6 +69,8 @@ class Sim:
                 raise AddressError(f"{name}: {key} is empty; {_SIM_FORM}")
         if "threshold" in found:
             found["threshold"] = _threshold(name, found["threshold"])
+        if "unplug" in found:
+            found["unplug"] = _unplug(name, found["unplug"], "sheets" in found)
         found["pace"] = _pace(name, found.get("pace"), "real time")
         if "sheets" in found and (other := {"skin", "threshold", "units"} & set(found)):
             raise AddressError(
@@ -75,7 +80,10 @@ class Sim:
 
 
 SIM_OPTIONS = tuple(field.name for field in dataclasses.fields(Sim))
-_SIM_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER, &units=FILE and &pace=1 where wanted"
+_SIM_FORM = (
+    "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER, &units=FILE, &unplug=SECONDS and &pace=1 where "
+    "wanted"
+)
 _ESCAPES = "a % that is meant is written %25, a & %26"
 
 
@@ -93,6 +101,15 @@ def _threshold(name: str, text: str) -> float:
     if not math.isfinite(value):
         raise AddressError(f"{name}: threshold is {text!r}; it must be a finite number")
     return value
+
+
+def _unplug(name: str, text: str, several: bool) -> tuple[int, float]:
+    form = "SHEET:SECONDS" if several else "SECONDS"
+    number, _, seconds = text.rpartition(":")
+    value, sheet = number_in(seconds), number_in(number) if several else 0
+    if (number and not several) or not 0 <= value < math.inf or sheet not in range(MOST_SHEETS):
+        raise AddressError(f"{name}: unplug is {text!r}; it must be {form}, with 0 or more seconds")
+    return int(sheet), value
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,7 @@ from contactfpga.driver.address import FLEXITAC, SheetOf
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.inputs.values import shell_words
-from contactfpga.wire.faults import STUCK
+from contactfpga.wire.faults import STUCK, UNPLUGGED
 from contactfpga.wire.hello import report_of
 from contactfpga.zones.units import only
 from contactfpga.zones.zone import Zones
@@ -123,6 +123,7 @@ def clock(board_s: float, host_s: float) -> Iterator[Finding]:
 
 
 NEXT_STEPS = {
+    UNPLUGGED: "the sheet is unplugged, or its supply is missing",
     "open": "look for a break in the line, its driver or its connector",
     "stuck": "it reads pressed while no row is driven: look for a short circuit there",
     "joined lines": "the self-test found a short circuit between lines",

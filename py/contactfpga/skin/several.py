@@ -14,7 +14,7 @@ from contactfpga.skin.skin import Skin
 MOST_SHEETS = 16
 """Largest number of sheets that packets can number."""
 
-_ALONE = ("guard", "units", "alive", "dual")
+_ALONE = ("units", "dual")
 
 
 @dataclasses.dataclass(frozen=True)

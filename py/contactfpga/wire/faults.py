@@ -14,6 +14,8 @@ SLOT_DIGITS = 2
 
 STUCK, UNNAMED = "stuck", "unnamed fault"
 """A fault without a name, and one before its name arrives."""
+UNPLUGGED = "all lines open"
+"""No line answers: the sheet is unplugged, or both guard lines are open at the board."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +43,8 @@ class Faults:
     def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:
         """The faults with names, for a sheet of this size; masked switches check no line.
 
-        If all checked columns are open, the guard row is named instead, and likewise the guard column.
+        If all checked columns are open, the guard row is named instead, and likewise the guard column; if all lines
+        are, :data:`UNPLUGGED` replaces both names.
         """
         masked = set(mask)
         all_rows, all_columns = range(rows), range(columns)
@@ -49,6 +52,8 @@ class Faults:
         checked_columns = {column for column in all_columns if any((row, column) not in masked for row in all_rows)}
         found = _open("row", "guard column open", self.rows_open, checked_rows)
         found += _open("column", "guard row open", self.columns_open, checked_columns)
+        if found == ["guard column open", "guard row open"]:
+            found = [UNPLUGGED]
         stuck = ("guard column" if column == columns else f"column {column}" for column in self.columns_stuck)
         found += [f"{line} stuck" for line in stuck]
         return dataclasses.replace(self, names=tuple(sorted(found + ["joined lines"] * self.joined)))

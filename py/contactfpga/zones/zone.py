@@ -154,8 +154,8 @@ class Zones(Sequence[Zone]):
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
         """Faults that the board noticed, sorted. With guard lines or a self-test these are names: ``row 3 open``,
         ``column 7 open``, ``column 2 stuck`` (it read pressed while no row was driven), ``guard row open`` (all columns
-        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``, or ``unnamed fault`` until
-        the names come. Otherwise ``stuck``."""
+        are), ``guard column open`` (all rows are), ``all lines open`` (the sheet is unplugged), ``guard column stuck``,
+        ``joined lines``, or ``unnamed fault`` until the names come. Otherwise ``stuck``."""
         self._before = before
         self._line = line
         self._history = history

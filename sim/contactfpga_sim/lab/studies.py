@@ -260,6 +260,7 @@ _ALL = (
         minutes=0.7,
         sections=tables(
             several_line=Section("tables:line_table", sample="tables:line_sample"),
+            several_told=Section("tables:told_table", sample="tables:told_sample"),
             several_size=Section("tables:size_table", of_netlists=True),
         ),
         extra="boards",

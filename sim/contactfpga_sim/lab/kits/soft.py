@@ -18,11 +18,13 @@ from contactfpga.design.cover.cells import cells_of
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps import errors, pool, result_cache
-from contactfpga_sim.apps.stats import Interval, interval
+from contactfpga_sim.apps.score import Interval, interval
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.benchmark.entries import OLDER, TOUCHED, Reading, Sensed
+from contactfpga_sim.lab.benchmark.pressed import Pressed
+from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.kits import predict
-from contactfpga_sim.lab.levels.compute import FAMILIES, OLDER, TOUCHED, Outcome, Reading, Sensed, outcome
-from contactfpga_sim.lab.levels.pressed import Pressed
+from contactfpga_sim.lab.levels.compute import outcome
 from contactfpga_sim.model.scenes.families import placements
 
 SCENES, PIECE, SEED = 400, 50, 3
@@ -79,12 +81,16 @@ class Domes(NamedTuple):
         return self.closed.astype(int)
 
 
+Outcome = tuple[bool, bool, float]
+
+
 def _piece(sheet: Sheet, family: str, first: int) -> list[Outcome]:
     def new() -> list[Outcome]:
         return [*_outcomes(sheet, family, first)]
 
     key = f"{result_cache.made_by(__name__, kits.kit(sheet.kit).skin)} {sheet} {sheet.cover} {family} {first} {SEED}"
-    return [Outcome(*one) for one in result_cache.cached("soft", key, new)]
+    found: list[Outcome] = result_cache.cached("soft", key, new)
+    return found
 
 
 def _outcomes(sheet: Sheet, family: str, first: int) -> Iterator[Outcome]:
@@ -96,14 +102,15 @@ def _outcomes(sheet: Sheet, family: str, first: int) -> Iterator[Outcome]:
         cells = cells_of(cover, skin.rows, skin.columns, pitch_m, pitch_m, number)
         forces_n = cells.forces_n(loads)
         read = Film(forces_n, cover.cell, SEED, number) if cover.cell else Domes(cells.closed_by(forces_n))
-        yield outcome(read, sheet.reading, Pressed(forces_n, there, there), skin)  # type: ignore[arg-type]
+        pressed = Pressed(forces_n, there, there)
+        yield outcome(read, sheet.reading, pressed, skin.pitch_x_mm)  # type: ignore[arg-type]
 
 
 def _judged(sheet: Sheet, family: str, workers: Executor) -> tuple[Interval, Interval]:
     """Shares of wrong counts, and errors of place in mm."""
     pieces = workers.map(functools.partial(_piece, sheet, family), range(0, SCENES, PIECE))
     found = [one for piece in pieces for one in piece]
-    return interval([float(one.wrong) for one in found]), interval([one.place_mm for one in found])
+    return interval([float(wrong) for wrong, _, _ in found]), interval([place_mm for _, _, place_mm in found])
 
 
 def verdict_table() -> writer.Table:

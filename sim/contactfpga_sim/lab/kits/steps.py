@@ -155,7 +155,7 @@ def soft_pieces() -> list[Piece]:
     corner, low, high = edge + 6.0, 0.15, 0.15 + film
     diodes = [(x - 1, -board - 1, x + 1, -board) for x in middles]
     spacer = f"spacer, {SOFT_SPACER_MM:g} mm, at each corner"
-    found = [
+    found: list[tuple[str, str, list[tuple[float, float, float, float]]]] = [
         (f"foam of {thick:g} mm, cut with the film", SOFT, [(a, high, b, high + thick) for a, b in cut]),
         ("resistive film (0.1 mm, drawn thicker)", picture_style.INK, [(a, low, b, high) for a, b in cut]),
         ("two combs of copper for each cell", picture_style.VERMILLION, [(x, 0, x + 0.25, low) for x in teeth]),

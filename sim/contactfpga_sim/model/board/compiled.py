@@ -308,6 +308,10 @@ class CompiledSheets(CompiledModel):
             raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
         self._call("press", ctypes.c_uint(number), to_words(cells).tobytes())
 
+    def plug(self, number: int, plugged: bool) -> None:
+        """Plug a sheet's cable in, or pull it off, between its shift registers and the FPGA."""
+        self._call("plug", ctypes.c_uint(number), ctypes.c_bool(plugged))
+
 
 def sheets_model(several: Several) -> native.Model:
     """Source of a board of several sheets."""
@@ -331,7 +335,8 @@ def sheets_model(several: Several) -> native.Model:
 
 
 def _sheet_entry(number: int, skin: Skin) -> str:
-    sizes = (number, skin.rows, skin.columns, skin.row_chains, skin.column_chains, int(skin.selects_low))
+    flags = int(skin.guard), skin.row_chains, skin.column_chains, int(skin.selects_low)
+    sizes = (number, skin.rows, skin.columns, *flags)
     lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
     return f"SHEET({', '.join((*map(str, sizes), *lines))})"
 

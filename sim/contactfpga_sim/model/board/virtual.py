@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
@@ -66,7 +67,8 @@ class VirtualBoard:
     instance a function from simulated time in s to pressed (rows, columns) bool cells; cover: default none; circuit:
     the sheet's, for settling times, default none; slow_rows, slow_columns: factors of settling time by line; units: a
     function from simulated time in s to the pressure units' readings, default half of full scale, or the LoadCells
-    under a scene with contacts; look_s: simulated time between two samples of the scene.
+    under a scene with contacts; look_s: simulated time between two samples of the scene; unplug_s: simulated time from
+    which the sheet is pulled off its board.
 
     ``contactfpga.open(VirtualBoard())`` opens it like any port. Exceptions of a scene's function come out of the call
     that waits for a frame.
@@ -82,6 +84,7 @@ class VirtualBoard:
         slow_columns: Mapping[int, float] | None = None,
         units: UnitSource | LoadCells | None = None,
         look_s: float = CHUNK_S,
+        unplug_s: float = math.inf,
     ):
         self.skin = skin or Skin()
         self.skins = (self.skin,)
@@ -94,6 +97,7 @@ class VirtualBoard:
         self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
         """(rows, columns) bool: switches closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
+        self._unplug_s = unplug_s
         self._cells, self._contacts = None, contacts_of(self.skin, scene)
         if circuit is not None and circuit.falling:
             if cover is None or cover.cell is None:
@@ -141,6 +145,9 @@ class VirtualBoard:
 
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the current scene."""
+        if self.clock() >= self._unplug_s:
+            self.plug(False)
+            self._unplug_s = math.inf
         touch, pressed = self._touch, self._scene(self.clock())
         self.pressed = pressed if touch is None else pressed | touch(self.clock())
         if self.skin.units:
@@ -151,6 +158,10 @@ class VirtualBoard:
         times_s = self._cells.times_s(self._cells.ohm(self._forces_n(), self.clock()))
         self._board.fall(times_s, self._cells.end, self._cells.threshold)
         self._board.hold(np.ones((1, *self.pressed.shape), bool), cycles)
+
+    def plug(self, plugged: bool) -> None:
+        """Plug the sheet in, or pull it off: no line reaches the board."""
+        self._board.cut({} if plugged else dict.fromkeys(range(self.skin.row_lines), 0), {})
 
     def _forces_n(self) -> np.ndarray:
         """Forces on resistive cells; under a scene that knows none, four times their level on those pressed, or what a
@@ -181,11 +192,15 @@ class VirtualBoard:
 class VirtualSheets:
     """A board of several sheets, with the interface of :class:`VirtualBoard`.
 
-    several: the sheets; scenes: an argument of :func:`contactfpga_sim.model.scenes.scene.scene` for each.
+    several: the sheets; scenes: an argument of :func:`contactfpga_sim.model.scenes.scene.scene` for each; unplug: a
+    sheet's number, and the simulated time in s from which it is pulled off.
     """
 
-    def __init__(self, several: Several, scenes: Sequence[Source]):
+    def __init__(self, several: Several, scenes: Sequence[Source], unplug: tuple[int, float] | None = None):
         self.several, self.skins = several, several.skins
+        if unplug is not None and unplug[0] >= len(self.skins):
+            raise ValueError(f"unplug names sheet {unplug[0]}; there are the sheets 0 to {len(self.skins) - 1}")
+        self._unplug = unplug
         self._scenes = [make_scene(skin, scene) for skin, scene in zip(several.skins, scenes, strict=True)]
         self._board = CompiledSheets(several)
         self._chunk = max(1, round(CHUNK_S * several.clock_hz))
@@ -204,9 +219,16 @@ class VirtualSheets:
             left -= cycles
 
     def advance(self, cycles: int) -> None:
+        if self._unplug is not None and self.clock() >= self._unplug[1]:
+            self.plug(self._unplug[0], False)
+            self._unplug = None
         for number, scene in enumerate(self._scenes):
             self._board.press(number, scene(self.clock()))
         self._board.run(cycles)
+
+    def plug(self, number: int, plugged: bool) -> None:
+        """Plug a sheet with its shift registers in, or pull it off."""
+        self._board.plug(number, plugged)
 
     def clock(self) -> float:
         return self._board.cycle / self.several.clock_hz
@@ -226,11 +248,12 @@ def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheet
         cover, circuit = load_cover(address.skin), load_checked(address.skin, skin)
     try:
         if several is not None:
-            return VirtualSheets(several, [address.scene] * len(several.skins))
+            return VirtualSheets(several, [address.scene] * len(several.skins), address.unplug)
         if address.units is not None:
             units = LoadCells.load(address.units)
         scene = _compared(address.scene, address.threshold)
-        return VirtualBoard(skin, scene, cover, circuit, units=units)
+        unplug_s = math.inf if address.unplug is None else address.unplug[1]
+        return VirtualBoard(skin, scene, cover, circuit, units=units, unplug_s=unplug_s)
     except ValueError as error:  # a scene that is not known, or that does not fit the sheet
         raise AddressError(f"{name}: {error}") from None
 

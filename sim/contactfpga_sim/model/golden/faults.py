@@ -50,7 +50,7 @@ def slot(facts: Facts, number: int, rows: int, columns: int) -> bytes:
 def _sealed(facts: Facts, digits: Sequence[int], flags: int) -> bytes:
     packet = Packet()
     packet.push(bytes([*(128 + digit for digit in digits), KIND << 4 | flags]))
-    return packet.wire(before=facts.fingerprint[:2])
+    return packet.wire(facts.fingerprint[:2], facts.closing)
 
 
 def _digits(word: int, bits: int) -> list[int]:

@@ -173,15 +173,18 @@ class Link:
 
     def take(self, taken: int, cycle: int) -> None:
         due, wait = self._due(cycle), self._waits_from(cycle)
+        after_report = taken if self._facts.place is not None and self._after_report >= 0 else self._after_report
+        frame_is_next = taken == after_report and self._frame is not None and self._frame[0] <= taken
+        self._after_report = -1
         if wait is None or wait > taken:
             self._send(taken, b"\0")
             self._ended = None
         elif self._hellos and min(self._hellos) <= taken:
             self._hellos = [wait for wait in self._hellos if wait > taken]
             self._send_hello(taken)
-        elif due is not None and due <= taken and not self._frame_is_next(taken):
+        elif due is not None and due <= taken and not frame_is_next:
             self._send_report(taken)
-        elif self._slot and self._slot[0] <= taken and not self._frame_is_next(taken):
+        elif self._slot and self._slot[0] <= taken and not frame_is_next:
             self._send_slot(taken, self._slot[1])
         elif not self._frame or self._frame[0] > taken or self._sweep_is_next(taken):
             self._send_sweep(taken)
@@ -204,9 +207,6 @@ class Link:
             assert self._reports is not None
             handed = [cycle for cycle, _ in self.bytes[begin : begin + len(report(self._facts))]]
             self.bytes[begin : begin + len(handed)] = list(zip(handed, self._reports.packet(handed), strict=True))
-
-    def _frame_is_next(self, cycle: int) -> bool:
-        return cycle == self._after_report and self._frame is not None and self._frame[0] <= cycle
 
     def _send_report(self, taken: int) -> None:
         assert self._reports is not None

@@ -30,9 +30,10 @@ def silent_lines(proof: Proof, diodes: Diodes) -> None:
     """Free: the columns, and when rows are taken.
 
     Claimed: a row that did not read the guard column in its slot is reported one clock after its strobe, likewise a
-    column that the guard row did not read; the frame's tag has it two clocks after its last strobe. It stays reported
-    until it answers in a round that renews. A line that answered in all of its slots is never reported, nor is a fully
-    masked row.
+    column that the guard row did not read; the frame's tag has it two clocks after its last strobe, so a frame in
+    which the guard column was not read with some row, or a column was not read by the guard row, has the flag. A line
+    stays reported until it answers in a round that renews. A line that answered in all of its slots is never reported,
+    nor is a fully masked row.
     """
     m, skin = proof.m, skin_of(diodes)
     dut = Scanner(skin)
@@ -52,6 +53,7 @@ def silent_lines(proof: Proof, diodes: Diodes) -> None:
         _report(proof, inside, strobe & (line == ROWS), silent[column], dut.faults.columns[column])
     with m.If(proof.before(proof.before(strobe & (line == ROWS - 1)))):
         proof.claim(dut.tag.fault | ~proof.before((dut.faults.rows | dut.faults.columns).any()))
+    _lost_cells_are_flagged(proof, dut, strobe, line, silent)
     _lemmas(proof, inside, dut, slot, line)
     level_lemmas(proof, inside, columns, released)
 
@@ -63,6 +65,19 @@ def _report(proof: Proof, inside: Inside, checked: Value, silent: Value, reporte
     proof.claim(reported | ~proof.before(checked & silent))
     proof.claim(reported | ~proof.before(reported) | proof.before(checked & inside["line_faults.renewing"]))
     proof.claim(ever | ~reported)
+
+
+def _lost_cells_are_flagged(proof: Proof, dut: Scanner, strobe: Value, line: Signal, silent: Signal) -> None:
+    rows, columns = Signal(ROWS - 1, name="lost_rows"), Signal(COLUMNS, name="lost_columns")  # in this frame
+    with proof.m.If(strobe & (line == ROWS)):
+        proof.m.d.sync += [rows.eq(0), columns.eq(silent)]
+    for row in range(ROWS - 1):
+        with proof.m.If(strobe & (line == row)):
+            proof.m.d.sync += rows[row].eq(silent[COLUMNS])
+    with proof.m.If(proof.before(proof.before(strobe & (line == ROWS - 1)))):
+        proof.claim(dut.tag.fault | ~(rows.any() | columns.any()))
+    proof.lemma((rows & ~dut.faults.rows) == 0)
+    proof.lemma((columns & ~dut.faults.columns) == 0)
 
 
 def _slots(m, dut: Scanner) -> tuple[Signal, Signal]:

@@ -8,6 +8,7 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
+from contactfpga.wire.sheet_number import NUMBER_BYTES, SheetPlace
 from contactfpga_hdl.link.faults import Reporter, report_of
 from contactfpga_hdl.link.link import Link
 from contactfpga_sim.verify.proofs.case import Bug, ProofCase
@@ -18,20 +19,29 @@ _ROUND = 4
 _IDLE, _FETCH, _BYTE, _TAIL = range(4)
 
 
-def reports_are_true(proof: Proof, skin: Skin) -> None:
+def reports_are_true(proof: Proof, skin: Skin, place_of: SheetPlace | None = None) -> None:
     """Free: the word in each clock, frames, wishes for a hello, when bytes are taken, one place of a report.
 
     Claimed: the byte at that place follows the word in the clock after the byte before was taken, and is stable. A
     report has the right length. Without one on the wire, after the word was stable for two clocks more than there are
     places, it is the last sent word or a report is due; after a hello one is due, too, until it is taken. Of two
     reports without a hello between them the second does not precede a frame that waited while the first was taken.
+
+    Free for one of several sheets: its grants. Assumed: a grant stays while it is held.
     """
     m = proof.m
     hello = protocol.encode_hello(skin)
     short = hello[:1] + hello[-CHECK_BYTES - 1 :]  # so that a search soon comes to what follows it
     with mock.patch.object(protocol, "encode_hello", return_value=short):
-        dut = Link(skin)
+        dut = Link(skin, place_of)
         inside = proof.put(dut)
+    closing = CHECK_BYTES
+    if place_of is not None:
+        closing += NUMBER_BYTES
+        grant = Signal()
+        m.d.comb += dut.grant.eq(grant)
+        m.d.sync += grant.eq(Mux(grant & dut.holds, 1, proof.free(1, "grant")))
+        proof.lemma(inside["idle"] | grant)
     _free_inputs(proof, dut)
     word = Value.cast(dut.faults)
     empty = report_of(len(word), 0)
@@ -46,7 +56,7 @@ def reports_are_true(proof: Proof, skin: Skin) -> None:
     with m.If(taken):
         m.d.sync += [reports.eq(take["report"]), index.eq(0)]
     with m.Elif(reports & transfer):
-        m.d.sync += [index.eq(index + 1), reports.eq(index != length + CHECK_BYTES)]
+        m.d.sync += [index.eq(index + 1), reports.eq(index != length + closing)]
     expected = Signal(8, name="expected")
     sent, ever = Signal(8, name="sent"), Signal(name="ever")
     last = Mux(ever, sent, Array(empty)[place])
@@ -56,12 +66,12 @@ def reports_are_true(proof: Proof, skin: Skin) -> None:
     with m.If(reports & dut.bytes.valid & (index == place)):
         proof.claim(dut.bytes.payload == expected)
         m.d.sync += [sent.eq(dut.bytes.payload), ever.eq(1)]
-    with m.If(reports & dut.bytes.valid & (index == length + CHECK_BYTES)):
+    with m.If(reports & dut.bytes.valid & (index == length + closing)):
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     proof.claim(~(reports & taken))
     _unreported(proof, dut, inside, reports, take, last, right[place])
     _order(proof, inside, take)
-    _lemmas(proof, inside, reports, index, place, expected, last, empty)
+    _lemmas(proof, inside, reports, index, place, expected, last, empty, closing)
 
 
 def _digit(word: Value, index: int) -> Value:
@@ -105,7 +115,7 @@ def _order(proof: Proof, inside: Inside, take) -> None:
     proof.lemma(~held | inside["is_report"])
 
 
-def _lemmas(proof: Proof, inside: Inside, reports, index, place, expected, last, empty: bytes) -> None:
+def _lemmas(proof: Proof, inside: Inside, reports, index, place, expected, last, empty: bytes, closing: int) -> None:
     length = len(empty)
     m, state, offset = proof.m, inside["wire_state"], inside["offset"]
     fetch, byte, tail = (state == one for one in (_FETCH, _BYTE, _TAIL))
@@ -115,7 +125,7 @@ def _lemmas(proof: Proof, inside: Inside, reports, index, place, expected, last,
         with m.If(fetch | byte):
             proof.lemma((offset == index) & ((index < length) | fetch & (index == length) & (inside["tail"] == 0)))
         with m.If(tail):
-            proof.lemma((inside["tail"] <= CHECK_BYTES) & (index == length + inside["tail"]))
+            proof.lemma((inside["tail"] <= closing) & (index == length + inside["tail"]))
     kept = inside.word("reporter.sent", place)
     writes = inside["reporter.offers"] & (inside["reporter.at"] == place)
     for constant in (0, length - 1):
@@ -130,6 +140,7 @@ def _sheet(rows: int, columns: int) -> Skin:
     return Skin(rows=rows, columns=columns, guard=True, settle_us=40)
 
 
+_PLACED_BUGS = (Bug("reports go first", Link, "is_report", lambda _, inside: Const(0)),)
 _BUGS = (
     Bug("no report after a hello", Reporter, "report_due", lambda due, inside: due & ~inside["greeted"]),
     Bug("a change is missed", Reporter, "watched", lambda _, inside: Const(0)),
@@ -140,6 +151,14 @@ _BUGS = (
 CASES = (
     ProofCase(
         "reports are true", "1x1, guard lines", partial(reports_are_true, skin=_sheet(1, 1)), 8, _BUGS, bug_clocks=36
+    ),
+    ProofCase(
+        "reports are true",
+        "1x1, guard lines, one of two sheets",
+        partial(reports_are_true, skin=_sheet(1, 1), place_of=SheetPlace(1, 2)),
+        8,
+        _PLACED_BUGS,
+        bug_clocks=36,
     ),
     ProofCase("reports are true", "2x3, guard lines", partial(reports_are_true, skin=_sheet(2, 3)), 8, campaign=True),
 )

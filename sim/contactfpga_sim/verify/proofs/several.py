@@ -14,6 +14,7 @@ from contactfpga_sim.verify.proofs.case import Bug, ProofCase
 from contactfpga_sim.verify.proofs.proof import Proof
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
+_GUARDED = _SKIN.replace(guard=True)
 _PLACE = SheetPlace(1, 2)
 
 
@@ -35,7 +36,7 @@ def grants_go_round(proof: Proof, sheets: int) -> None:
     proof.lemma(whose < sheets)
 
 
-def packets_are_whole(proof: Proof, hello: bytes) -> None:
+def packets_are_whole(proof: Proof, hello: bytes, skin: Skin = _SKIN) -> None:
     """Free: all inputs of a sheet's link in each clock, and its waits for the grant. Assumed: the grant stays while it
     is held, as ``grants_go_round`` shows.
 
@@ -44,9 +45,9 @@ def packets_are_whole(proof: Proof, hello: bytes) -> None:
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
-        dut = Link(_SKIN, _PLACE)
+        dut = Link(skin, _PLACE)
         inside = proof.put(dut)
-    for name in ("asked", "epoch", "number", "tag", "summary"):
+    for name in ("asked", "epoch", "number", "tag", "summary", *(["faults"] if skin.guard else [])):
         port = getattr(dut, name)
         m.d.comb += port.eq(proof.free(port.shape(), name))
     frames = dut.frames
@@ -64,7 +65,7 @@ def packets_are_whole(proof: Proof, hello: bytes) -> None:
     with m.If(moves):
         m.d.sync += last.eq(dut.bytes.payload)
     m.d.sync += sent.eq(grant & dut.holds & (sent | moves))
-    takes = inside["take_frame"] | inside["take_hello"]
+    takes = inside["take_frame"] | inside["take_hello"] | (inside["take_report"] if skin.guard else 0)
     proof.claim(grant | ~dut.bytes.valid)
     proof.claim(grant | ~takes)
     proof.claim(~(sent & takes))
@@ -79,6 +80,11 @@ _GRANT_BUGS = (
     Bug("a grant is given up in a packet", RoundRobin, "others", lambda others, inside: inside["grant"]),
     Bug("the first sheet always has a grant", RoundRobin, "grant", lambda grant, inside: grant | 1),
 )
+_REPORT_BUGS = (
+    Bug("a report is taken without a grant", Link, "take_report",
+        lambda take, inside: take | inside["idle"] & inside["reporter.due"]),
+    Bug("a report does not hold its grant", Link, "holds", lambda holds, inside: holds & ~inside["take_report"]),
+)  # fmt: skip
 _PACKET_BUGS = (
     Bug("taken without a grant", Link, "take_frame",
         lambda take, inside: take | inside["idle"] & inside["waits"] & ~inside["take_hello"]),
@@ -94,6 +100,14 @@ CASES = (
         partial(packets_are_whole, hello=bytes([0, 2, 0x40, *[0x80] * 3, 0])),
         2,
         _PACKET_BUGS,
+        bug_clocks=28,
+    ),
+    ProofCase(
+        "packets of several sheets are whole",
+        "1x2, guard lines, hello of 3 bytes",
+        partial(packets_are_whole, hello=bytes([0, 2, 0x40, *[0x80] * 3, 0]), skin=_GUARDED),
+        2,
+        _REPORT_BUGS,
         bug_clocks=28,
     ),
     ProofCase(

@@ -37,8 +37,8 @@ def film(bench: Bench) -> Step:
         levels = rest.levels(bench.board, bench.timeout).levels
         instants = (levels - 0.5) / falling.SIXTEENTHS * falling.ruler_s(bench.stated, skin.row_lines, skin.columns)
         pressed = falling.Corner(together=skin.columns, others=skin.rows - 1)
-        found = falling.read_ohm(bench.stated, skin.row_lines, instants, pressed)
-        ohm.append(np.where(levels < NEVER, np.maximum(found, falling.GRID_OHM[0]), np.nan))
+        read = falling.read_ohm(bench.stated, skin.row_lines, instants, pressed)
+        ohm.append(np.where(levels < NEVER, np.maximum(read, falling.GRID_OHM[0]), np.nan))
     if np.isfinite(ohm[0]).mean() < 0.5:
         few = "most cells read released under the lighter weight; does it lie evenly on the foam?"
         return Step("film", (Finding("fault", few),))

@@ -18,6 +18,7 @@ from contactfpga.tools.commands import doctor
 from contactfpga.tools.commands.bringup import film, times
 from contactfpga.tools.commands.bringup.bench import Bench, Step
 from contactfpga.tools.console import interrupt
+from contactfpga.wire.faults import UNPLUGGED
 from contactfpga.zones.zone import Zones
 
 READS = 50
@@ -82,7 +83,7 @@ def lines(bench: Bench) -> Step:
             pressed &= zones.cells
     found = [finding for finding in health.lines(board, zones) if finding.verdict == "fault"]
     stop = ""
-    if {"guard row open", "guard column open"} <= set(_faults(board)):
+    if UNPLUGGED in _faults(board):
         stop = "no line answers at all: look at the sheet's supply, its connectors and the order of its cables"
     if zones.cells is not None and (stuck := places(pressed)):
         if 2 * len(stuck) > skin.rows * skin.columns:

@@ -1,12 +1,12 @@
 // Several sheets at one FPGA: the gateware, a sheet of switches on shift registers at the pins of each, and a UART at the
-// other end of its line. Compiled for BIT_CLOCKS and EACH_SHEET, which has an entry SHEET(number, rows, columns, chains of
-// rows, chains of columns, whether a selected row is low, lines of rows, lines of columns) for each; lists of lines are
-// LINES(first, ...). With MUTANTS the gateware has an input that picks a mutant.
+// other end of its line. Compiled for BIT_CLOCKS and EACH_SHEET, which has an entry SHEET(number, rows, columns, guard lines,
+// chains of rows, chains of columns, whether a selected row is low, lines of rows, lines of columns) for each; lists of
+// lines are LINES(first, ...). With MUTANTS the gateware has an input that picks a mutant.
 #include <algorithm>
 #include <vector>
 
-#define ROW_LINES 64
-#define COLUMN_LINES 64
+#define ROW_LINES 65
+#define COLUMN_LINES 65
 
 #include "clocked.h"
 #include "shift.h"
@@ -14,16 +14,27 @@
 
 enum Boundary { LINE, CONTACT, RECEIVED, BOUNDARIES };
 
-// A pressed switch passes the selecting level of its row to its column, and nothing else.
-template <unsigned ROWS, unsigned COLUMNS, unsigned ROW_CHAINS, unsigned COLUMN_CHAINS, bool SELECTS_LOW>
+// A pressed switch passes the selecting level of its row to its column, and nothing else. Guard lines are last. Between the
+// FPGA and the registers is a connector; the FPGA pulls the data of an unplugged one to the released level.
+template <unsigned ROWS, unsigned COLUMNS, bool GUARD, unsigned ROW_CHAINS, unsigned COLUMN_CHAINS, bool SELECTS_LOW>
 class Sheet {
 public:
     Sheet(std::vector<uint8_t> line_of_row, std::vector<uint8_t> line_of_column)
-        : line_of_row_(line_of_row), line_of_column_(line_of_column) {}
+        : line_of_row_(line_of_row), line_of_column_(line_of_column) {
+        if (GUARD)
+            closed_[line_of_row_[ROWS]] = mask(COLUMNS);
+    }
+
+    // Registers that are plugged in hold what they hold at power-up.
+    void plug(bool plugged) {
+        if (plugged && !plugged_)
+            rows_ = {}, columns_ = {};
+        plugged_ = plugged;
+    }
 
     void press(const uint64_t *cells) {
         for (unsigned row = 0; row < ROWS; row++) {
-            Word closed = 0;
+            Word closed = Word{GUARD} << line_of_column_.back();
             for (uint64_t left = cells[row]; left; left &= left - 1)
                 closed |= Word{1} << line_of_column_[lowest(left)];
             closed_[line_of_row_[row]] = closed;
@@ -32,18 +43,22 @@ public:
 
     // Levels of the column registers' outputs, for those of the pins.
     uint64_t step(uint64_t data, bool clock, bool latch, bool enable_n, bool load_n, bool column_clock) {
-        const Word levels = rows_.step(data, clock, latch, enable_n, SELECTS_LOW ? mask(ROWS) : 0);
+        if (!plugged_)
+            return SELECTS_LOW ? (1u << COLUMN_CHAINS) - 1 : 0;
+        const Word levels = rows_.step(data, clock, latch, enable_n, SELECTS_LOW ? mask(LINES) : 0);
         Word reads = 0;
-        for (Word left = (SELECTS_LOW ? ~levels : levels) & mask(ROWS); left; left &= left - 1)
+        for (Word left = (SELECTS_LOW ? ~levels : levels) & mask(LINES); left; left &= left - 1)
             reads |= closed_[lowest(left)];
-        return columns_.step(load_n, column_clock, (SELECTS_LOW ? ~reads : reads) & mask(COLUMNS));
+        return columns_.step(load_n, column_clock, (SELECTS_LOW ? ~reads : reads) & mask(COLUMNS + GUARD));
     }
 
 private:
+    static constexpr unsigned LINES = ROWS + GUARD;
     std::vector<uint8_t> line_of_row_, line_of_column_;
-    Word closed_[ROWS] = {};  // by a row's line, the lines of the columns that it reaches
-    RowRegisters<ROWS, ROW_CHAINS> rows_;
-    ColumnRegisters<COLUMNS, COLUMN_CHAINS> columns_;
+    Word closed_[LINES] = {};  // by a row's line, the lines of the columns that it reaches
+    bool plugged_ = true;
+    RowRegisters<LINES, ROW_CHAINS> rows_;
+    ColumnRegisters<COLUMNS + GUARD, COLUMN_CHAINS> columns_;
 };
 
 #define LINES(...) {__VA_ARGS__}
@@ -51,8 +66,8 @@ private:
 class Board {
     Clocked model_;
 
-#define SHEET(NUMBER, ROWS, COLUMNS, ROW_CHAINS, COLUMN_CHAINS, SELECTS_LOW, ROW_LIST, COLUMN_LIST) \
-    Sheet<ROWS, COLUMNS, ROW_CHAINS, COLUMN_CHAINS, SELECTS_LOW> sheet_##NUMBER{ROW_LIST, COLUMN_LIST};
+#define SHEET(NUMBER, ROWS, COLUMNS, GUARD, ROW_CHAINS, COLUMN_CHAINS, SELECTS_LOW, ROW_LIST, COLUMN_LIST) \
+    Sheet<ROWS, COLUMNS, GUARD, ROW_CHAINS, COLUMN_CHAINS, SELECTS_LOW> sheet_##NUMBER{ROW_LIST, COLUMN_LIST};
     EACH_SHEET
 #undef SHEET
 
@@ -85,6 +100,14 @@ public:
 #define SHEET(NUMBER, ...)  \
     if (number == NUMBER) \
         sheet_##NUMBER.press(cells);
+        EACH_SHEET
+#undef SHEET
+    }
+
+    void plug(unsigned number, bool plugged) {
+#define SHEET(NUMBER, ...)  \
+    if (number == NUMBER) \
+        sheet_##NUMBER.plug(plugged);
         EACH_SHEET
 #undef SHEET
     }
@@ -128,6 +151,7 @@ EXPORT void board_restart(Board *board, unsigned mutant) {
     board->mutant = mutant;
 }
 EXPORT void board_press(Board *board, unsigned number, const uint64_t *cells) { board->press(number, cells); }
+EXPORT void board_plug(Board *board, unsigned number, bool plugged) { board->plug(number, plugged); }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
     board->sender.bytes.insert(board->sender.bytes.end(), bytes, bytes + count);

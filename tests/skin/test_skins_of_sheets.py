@@ -24,8 +24,6 @@ def test_the_example_is_two_sheets():
         ({"baud": 1_000_000}, "sheet 1: baud is 1000000, that of sheet 0 is 3000000"),
         ({"row_drive": "direct"}, "sheet 1: row_drive is 'direct'.*set row_drive = '74hc595'"),
         ({"column_read": "direct"}, "sheet 1: column_read is 'direct'"),
-        ({"guard": True}, "sheet 1: guard is True"),
-        ({"alive": True}, "sheet 1: alive is True"),
         ({"dual": True}, "sheet 1: dual is True"),
         ({"units": 3, "baud": 3_000_000}, "sheet 1: units is 3"),
     ],
