@@ -92,7 +92,7 @@ def _latest(several: Several, cells: np.ndarray) -> int:
     skin, count, rng = several.skins[0], len(several.skins), np.random.default_rng(len(several.skins))
     away, found = Cuts(dict.fromkeys(range(skin.row_lines), 0)), []
     for _ in range(16 // count):
-        starts = rng.integers(0.004 * skin.clock_hz, 0.012 * skin.clock_hz, size=count)
+        starts = rng.integers(round(0.004 * skin.clock_hz), round(0.012 * skin.clock_hz), size=count)
         lines = [Timeline([(0, cells, None)], cuts=[(int(start), away)]) for start in starts]
         traces = predict_several(several.skins, lines, round(0.012 * skin.clock_hz) + told_clocks(several, 0))
         found += [_reported(trace, start) - start for trace, start in zip(traces, starts, strict=True)]
