@@ -252,8 +252,11 @@ class Zones(Sequence[Zone]):
         if self.frame.bitmap is None:
             return None
         key = [zone.area_cells, zone.sum_x, zone.sum_y]
-        numbers = [number for number, record in enumerate(self.records.tolist(), 1) if record == key]
-        return np.isin(self._labels, numbers)
+        found = np.zeros(self.frame.bitmap.shape, bool)
+        for number, record in enumerate(self.records.tolist(), 1):
+            if record == key:
+                found |= self._labels == number
+        return found
 
     @functools.cached_property
     def _ghost_cells(self) -> np.ndarray:

@@ -253,7 +253,7 @@ class ContactSurfaces:
             if center is not None and outside is not None:
                 middle = self._flat(center.point_m)
                 if center.covariance_m2 is not None:
-                    region = polygons.within(corners, self._ellipse(center, outside))
+                    region = polygons.within(corners, self._around(corners, self._ellipse(center, outside)))
                 if not region:
                     doubts.append("by the pressure units the center of pressure lies elsewhere")
                     region = corners
@@ -281,6 +281,14 @@ class ContactSurfaces:
         points, normals = self._surface.place(flat[:, 0], flat[:, 1])
         ends = np.cumsum([len(some) for some in places_mm])[:-1]
         return np.split(self._pose.apply(1e-3 * points), ends), np.split(self._pose.turn(normals), ends)
+
+    def _around(self, corners: list[Point], other: list[Point]) -> list[Point]:
+        """Another polygon, on a cylinder on the turn that is nearest to these corners."""
+        if self.sheet.radius_mm is None:
+            return other
+        turn = 2 * math.pi * self.sheet.radius_mm
+        by = turn * round((np.mean(corners, axis=0)[0] - np.mean(other, axis=0)[0]) / turn)
+        return [(x + by, y) for x, y in other]
 
     def _flat(self, point_m: Vector) -> Point:
         """The place on the sheet in mm that is nearest to a point in the link's frame."""
@@ -338,7 +346,7 @@ class ContactSurfaces:
         return [f"zone {other} is less than a pitch away: both may be one contact" for other in near if other != number]
 
     def _barycenter(self, zones: Zones, zone: Zone, corners: list[Point], pressures: Floats | None) -> Point:
-        cells = zones.cells_of(zone)
+        cells = None if pressures is None else zones.cells_of(zone)
         if pressures is not None and cells is not None and (weights := pressures * cells).any():
             rows, columns = np.nonzero(cells)
             columns = _unrolled(columns, self.sheet.columns) if self.sheet.closed else columns
