@@ -32,7 +32,7 @@ SPREAD = 0.1
 FAMILIES = ("bumper", "fingers", "pair", "palm", "edge")
 SUPPORTS = ("long edge", "corner", "plate", "bar")
 MODELS = ("model", "elements")
-SCENES, PIECE = 100, 25
+SCENES, PIECE = 40, 10
 """Scenes of a kind by each model, and per piece of work."""
 FINE = 8
 """Points per pitch at which the model's pressure is read."""
