@@ -196,7 +196,7 @@ class ContactSurfaces:
 
     >>> from contactfpga.body import ContactSurfaces
     >>> from contactfpga_sim import VirtualBoard
-    >>> skin = contactfpga.Skin(report="cells")
+    >>> skin = contactfpga.Skin(extent=True)
     >>> with contactfpga.open(VirtualBoard(skin, scene="two_fingers")) as board:
     ...     support = ContactSurfaces(skin.sheet).supports(board.read())[0]
     >>> round(1e6 * support.area_m2), "mm2"
