@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import zlib
 from typing import NamedTuple
 
@@ -194,21 +193,10 @@ def outcomes(task: Task) -> list[Outcome]:
     return [outcome(drawn(task.design, task.model, task.kind, number), pitch) for number in numbers]
 
 
-@dataclasses.dataclass(frozen=True)
-class Judged:
-    """All scenes of one kind."""
-
-    outcomes: list[Outcome]
-
-    @property
-    def zones(self) -> list[Zone]:
-        return [zone for one in self.outcomes for zone in one.zones]
-
-
-def compute() -> dict[tuple[str, str, str], Judged]:
-    """By design, kind and model."""
+def compute() -> dict[tuple[str, str, str], list[Outcome]]:
+    """Outcomes of all scenes by design, kind and model."""
     keys = [(design, kind, model) for design in DESIGNS for kind in (*FAMILIES, *SUPPORTS) for model in MODELS]
     tasks = [Task(design, model, kind, first) for design, kind, model in keys for first in range(0, SCENES, PIECE)]
     with pool.executor() as workers:
         pieces = iter(workers.map(outcomes, tasks))
-        return {key: Judged([one for _ in range(0, SCENES, PIECE) for one in next(pieces)]) for key in keys}
+        return {key: [one for _ in range(0, SCENES, PIECE) for one in next(pieces)] for key in keys}

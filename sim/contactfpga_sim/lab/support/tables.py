@@ -14,10 +14,9 @@ from contactfpga import picture_style as style
 from contactfpga_sim.apps.stats import quantile, wilson
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.support import compute
-from contactfpga_sim.lab.support.compute import DESIGNS, MODELS, Judged
+from contactfpga_sim.lab.support.compute import DESIGNS, MODELS, Outcome
 
 SHOWN = (
-    "cells",
     "contact",
     "held, elements",
     "center, elements",
@@ -28,7 +27,7 @@ SHOWN = (
 DRAWN = (("bumper", 2), ("bar", 0), ("fingers", 5))
 
 
-def surfaces_table(found: dict[tuple[str, str, str], Judged]) -> writer.Table:
+def surfaces_table(found: dict[tuple[str, str, str], list[Outcome]]) -> writer.Table:
     """A row for each design and kind of contact."""
     parts = ("held", "center", "area", "rectangle", "force", "two said", "one said two")
     head = ["cells", "contact", *(f"{part}, {model}" for part in parts for model in MODELS)]
@@ -40,13 +39,13 @@ def surfaces_table(found: dict[tuple[str, str, str], Judged]) -> writer.Table:
     return writer.Table(head, rows, lambda row: row[0] == best, SHOWN)
 
 
-def _row(judged: Judged) -> list[str]:
-    zones = judged.zones
+def _row(judged: list[Outcome]) -> list[str]:
+    zones = [zone for one in judged for zone in one.zones]
     return [
-        _share([held for one in judged.outcomes for held in one.held]),
+        _share([held for one in judged for held in one.held]),
         _share([zone.center for zone in zones]),
         *(_ratio([zone[field] for zone in zones]) for field in (1, 2)),
-        _least([share for one in judged.outcomes for share in one.force]),
+        _least([share for one in judged for share in one.force]),
         _share([zone.doubted for zone in zones if zone.several]),
         _share([zone.doubted for zone in zones if not zone.several]),
     ]
@@ -89,5 +88,6 @@ def draw(folder: Path) -> list[Path]:
             middle, half = (low + high) / 2, np.max(high - low) / 2 + pitch
             place.set(xlim=middle[0] + half * np.array([-1, 1]), ylim=middle[1] + half * np.array([1, -1]))
             place.set(aspect="equal", xticks=[], yticks=[])
+            place.spines[["left", "bottom"]].set_visible(False)
             place.set_title(f"{kind}, {2 * half:.0f} mm wide", loc="left")
         return [style.save(figure, folder / "support-surfaces.svg")]
