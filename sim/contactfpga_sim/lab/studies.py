@@ -286,7 +286,7 @@ _ALL = (
         "support",
         title="Contact surfaces against the contacts that they hold",
         page="support.md",
-        minutes=2,
+        minutes=1,
         sections=tables("surfaces"),
         compute="compute:compute",
         pictures="tables:draw",
