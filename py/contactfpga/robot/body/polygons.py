@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-import numpy as np
-
 Point = tuple[float, float]
 
 
@@ -58,20 +56,15 @@ def area(corners: list[Point]) -> float:
 
 
 def depth(corners: list[Point], point: Point) -> float:
-    """How far a point lies within the edge of a polygon. Below 0 the point lies outside, by at least that much."""
-    if len(corners) < 3:
-        return -_to_segment(corners, point) if corners else -math.inf
+    """Distance of a point from the edge of a polygon: above 0 within it, below 0 outside; -inf without corners."""
     x, y = point
-    return min(
-        ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / math.hypot(bx - ax, by - ay)
-        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1])
-    )
-
-
-def _to_segment(ends: list[Point], point: Point) -> float:
-    start, way = np.array(ends[0]), np.subtract(ends[-1], ends[0])
-    part = np.clip((point - start) @ way / max(way @ way, 1e-300), 0, 1)
-    return float(np.linalg.norm(point - start - part * way))
+    found, nearest = math.inf, math.inf
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1]):
+        wide = (bx - ax) ** 2 + (by - ay) ** 2
+        part = min(1.0, max(0.0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / wide)) if wide else 0.0
+        nearest = min(nearest, math.hypot(x - ax - part * (bx - ax), y - ay - part * (by - ay)))
+        found = min(found, (bx - ax) * (y - ay) - (by - ay) * (x - ax))
+    return nearest if found >= 0 and len(corners) > 2 else -nearest
 
 
 def edges_split(corners: list[Point], longest: float) -> list[Point]:

@@ -1,11 +1,11 @@
 """Contact surfaces: the convex polygon on the link that holds the contact of a zone, and what presses there.
 
-What is held is the *firm* contact: every square, one pitch wide and along the lines, in which the pressure is
-everywhere at least :data:`FIRM_PA`, and all such squares that are joined by moving one into the other. A square covers
-a quarter of some cell or more. If that quarter closes the cell, then joined squares close the cells of one zone, with
-either connectivity. A square lies beyond these cells by at most the depth ``d`` to which it may press half the side of
-a cell without closing it; d = 2 f/(p pitch) for tiles that close at the force f. So the polygon is the hull of the
-cells, grown by d in x and y. Contact that presses less, contact on masked or broken cells, and cells that closed or
+What is held is the *firm* contact: every square on the sheet, one pitch wide and along the lines, in which the pressure
+is everywhere at least :data:`FIRM_PA`, and all such squares that are joined by moving one into the other. A square
+covers a quarter of some cell or more. If that quarter closes the cell, then joined squares close the cells of one zone,
+with either connectivity. A square lies beyond these cells by at most the depth ``d`` to which it may press half the
+side of a cell without closing it; d = 2 f/(p pitch) for tiles that close at the force f. So the polygon is the hull of
+the cells, grown by d in x and y. Contact that presses less, contact on masked or broken cells, and cells that closed or
 opened while the sheet was scanned are not held.
 """
 
