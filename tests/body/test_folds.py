@@ -12,7 +12,7 @@ from model_board import DirectPort
 import contactfpga
 from contactfpga.robot.body import BodyError, Snapshot
 from contactfpga.robot.body.body import Body
-from contactfpga.robot.body.folds import Folds, cells_of, learn
+from contactfpga.robot.body.folds import Folds, learn
 from contactfpga.robot.body.state import LinkState
 from contactfpga.tools import cli
 from contactfpga.wire.protocol import Frame, no_records
@@ -61,7 +61,7 @@ def test_fold_over_the_seam_of_a_closed_sheet():
     crease, finger = [(0, 5), (0, 0)], [(3, 2)]
     known = learn("elbow", [(0.0, frame(*crease, skin=skin))], 0.1)
     shown = frame(*crease, *finger, skin=skin)
-    found = [known.share(0.0, cells_of(shown, zone)) for zone in shown]
+    found = [known.share(0.0, shown.cells_of(zone)) for zone in shown]
     assert found == [1.0, 0.0]
 
 

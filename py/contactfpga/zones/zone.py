@@ -246,6 +246,18 @@ class Zones(Sequence[Zone]):
         otherwise None."""
         return None if self.frame.bitmap is None else self._ghost_cells
 
+    def cells_of(self, zone: Zone) -> np.ndarray | None:
+        """(rows, columns) bool of one zone's cells with ``report = "cells"``; otherwise None. Zones that
+        have the same area and sums, as rings in one another, are not told apart."""
+        if self.frame.bitmap is None:
+            return None
+        key = [zone.area_cells, zone.sum_x, zone.sum_y]
+        found = np.zeros(self.frame.bitmap.shape, bool)
+        for number, record in enumerate(self.records.tolist(), 1):
+            if record == key:
+                found |= self._labels == number
+        return found
+
     @functools.cached_property
     def _ghost_cells(self) -> np.ndarray:
         if not self.sheet.ghosts:

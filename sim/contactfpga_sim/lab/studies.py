@@ -287,6 +287,16 @@ _ALL = (
         sections=tables(fields=Section("tables:fields_table", sample="tables:fields_table")),
     ),
     Study(
+        "support",
+        title="Contact surfaces against the contacts that they hold",
+        page="support.md",
+        minutes=1,
+        sections=tables("surfaces"),
+        compute="compute:compute",
+        pictures="tables:draw",
+        extra="chart",
+    ),
+    Study(
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from contactfpga.inputs.files import read_small, write_text
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.robot.body.state import BodyError
-from contactfpga.zones import around, labels
-from contactfpga.zones.zone import Zone, Zones
+from contactfpga.zones.zone import Zones
 
 STEP_RAD = 0.05
 """Resolution of angles."""
@@ -97,19 +96,6 @@ def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = S
         counts[step] = counts.get(step, 0) + 1
         cells[step] = cells.get(step, np.zeros(lines, bool)) | zones.cells
     return Folds(joint, step_rad, lines, counts, cells)
-
-
-def cells_of(zones: Zones, zone: Zone) -> Cells | None:
-    """(rows, columns) bool of one zone; None if the board sends no cells."""
-    if zones.cells is None:
-        return None
-    reach = zones.sheet.connectivity
-    numbers = around.label(zones.cells, reach)[0] if zones.sheet.closed else labels.label(zones.cells, reach)
-    found = np.zeros(zones.cells.shape, bool)
-    for number, (area, sum_x, sum_y) in enumerate(zones.records.tolist(), 1):
-        if (area, sum_x, sum_y) == (zone.area_cells, zone.sum_x, zone.sum_y):
-            found |= numbers == number
-    return found
 
 
 def _read(values: Any) -> Folds:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 
 from contactfpga import surfaces
 from contactfpga.choices.choice import trusting
-from contactfpga.design.cover import load_cover
+from contactfpga.design.cover import Cover, load_cover
 from contactfpga.driver.address import MAX_NAME, SheetOf, Sim
 from contactfpga.driver.events import longest_pause_s
 from contactfpga.errors import ContactFPGAError
@@ -21,6 +22,7 @@ from contactfpga.inputs.values import is_finite, shown, suggestion
 from contactfpga.robot.body.folds import Folds
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.state import BodyError
+from contactfpga.robot.body.support import ContactSurfaces
 from contactfpga.robot.haptics.cover_bias import CoverBias
 from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
@@ -55,8 +57,10 @@ class Plan:
     silent_s: float
     """Time without a frame from which the link is silent."""
     folds: Folds | None = None
+    cover: Cover | None = None
+    """The Skin's cover."""
     bias: CoverBias | None = None
-    """Places under the Skin's cover; None if it knows no force."""
+    """Places under this cover; None if it knows no force."""
     trust: bool = False
     """Whether Skin files of the port may name modules."""
 
@@ -70,6 +74,13 @@ class Plan:
         """Point in m and outward normal, in the link's frame, of a place on the sheet."""
         point_mm, normal = self.laid.place(x_mm, y_mm)
         return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
+
+    @functools.cached_property
+    def contact_surfaces(self) -> ContactSurfaces:
+        """Finds the contact surfaces of the link's zones. Raises :class:`BodyError` as :class:`ContactSurfaces`."""
+        return ContactSurfaces(
+            self.skin.sheet, self.cover, surface=self.laid, pose=self.pose, link=self.name, frame=self.frame
+        )
 
     @property
     def virtual(self) -> bool:
@@ -135,13 +146,13 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
         folds=folds,
-        bias=_bias(skin, skin_path),
+        cover=(cover := load_cover(skin_path)),
+        bias=_bias(skin, cover),
         trust=trusting(),
     )
 
 
-def _bias(skin: Skin, path: Path) -> CoverBias | None:
-    cover = load_cover(path)
+def _bias(skin: Skin, cover: Cover | None) -> CoverBias | None:
     if cover is None or cover.model == "patch":
         return None
     return CoverBias(cover, 1e-3 * skin.pitch_x_mm, 1e-3 * skin.pitch_y_mm)

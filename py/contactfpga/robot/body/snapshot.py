@@ -15,11 +15,11 @@ from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.robot import haptics
-from contactfpga.robot.body.folds import cells_of
 from contactfpga.robot.body.joints import Joints
 from contactfpga.robot.body.kinematics import Kinematics, Pose
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.state import BodyError, LinkState, NoJoints, NoLinkData
+from contactfpga.robot.body.support import Support
 from contactfpga.robot.haptics.cover_bias import CoverBias
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
@@ -155,7 +155,7 @@ def _sharper(bias: CoverBias, zone: Zone, found: haptics.Contact) -> haptics.Tou
 def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:
     if plan.folds is None or angles is None or plan.folds.joint not in angles:
         return None
-    cells = cells_of(zones, zone)
+    cells = zones.cells_of(zone)
     return None if cells is None else plan.folds.share(angles[plan.folds.joint], cells)
 
 
@@ -224,6 +224,32 @@ class Snapshot:
         Args:
             frame: ``base``, or ``link`` for each in the frame of its own link.
         """
+        found: list[LinkContact] = []
+        for name in self._asked(frame, links):
+            known = self._angles.get(name)
+            angles = None if isinstance(known, ContactFPGAError) else known
+            mine = on_link(self._body.links[name], self.links[name], angles)
+            if frame == BASE and mine:
+                mine = self._in_base(name, mine)
+            found += mine
+        return found
+
+    def supports(self, frame: str = BASE, links: Collection[str] | None = None) -> list[Support]:
+        """The contact surface of each zone, with what presses there; arguments and errors as of :meth:`contacts`. Also
+        raises :class:`BodyError` for a board that sends neither cells nor extents."""
+        found: list[Support] = []
+        for name in self._asked(frame, links):
+            plan, zones = self._body.links[name], self.links[name].zones
+            assert zones is not None
+            outside = None if plan.units is None else plan.units.surface
+            mine = plan.contact_surfaces.supports(zones, forces_of(plan, zones) if len(zones) else None, outside)
+            if frame == BASE and mine:
+                pose = self._kinematics.pose(plan.frame, self._angles_of(name))
+                mine = [one.moved(pose, BASE) for one in mine]
+            found += mine
+        return found
+
+    def _asked(self, frame: str, links: Collection[str] | None) -> list[str]:
         if frame not in (BASE, LINK):
             raise BodyError(f"frame is {shown(frame)}; it must be 'base' or 'link'")
         asked = list(self.links) if links is None else list(links)
@@ -233,15 +259,7 @@ class Snapshot:
         missing = {name: self.links[name] for name in asked if self.links[name].status != "ok"}
         if missing:
             raise NoLinkData(missing)
-        found: list[LinkContact] = []
-        for name in asked:
-            known = self._angles.get(name)
-            angles = None if isinstance(known, ContactFPGAError) else known
-            mine = on_link(self._body.links[name], self.links[name], angles)
-            if frame == BASE and mine:
-                mine = self._in_base(name, mine)
-            found += mine
-        return found
+        return asked
 
     def _in_base(self, name: str, contacts: list[LinkContact]) -> list[LinkContact]:
         frame, beside = self._body.links[name].frame, self._beside.get(name)

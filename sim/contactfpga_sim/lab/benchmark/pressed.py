@@ -158,7 +158,26 @@ class Contact:
         raise AssertionError("the contact does not settle")
 
 
-def pressed(scene: Scene, skin: Skin) -> Pressed:
+class Patches(NamedTuple):
+    """Forces on the patches of a sheet."""
+
+    force_n: np.ndarray
+    """(n, m)."""
+    x_mm: np.ndarray
+    """(m,): middles of the patches along the columns; those of a tile lie side by side."""
+    y_mm: np.ndarray
+    """(n,): middles along the rows."""
+    per: int
+    """Patches of a tile in each direction."""
+
+    @property
+    def cells_n(self) -> np.ndarray:
+        """(rows, columns) force on each cell."""
+        rows, columns = (side // self.per for side in self.force_n.shape)
+        return self.force_n.reshape(rows, self.per, columns, self.per).sum(axis=(1, 3))
+
+
+def patches(scene: Scene, skin: Skin) -> Patches:
     """A scene at rest, as it is drawn: its bodies are not yet on a cover. Each presses as if it were alone."""
     sheet = tiles(skin.pitch_x_mm)
     x, y = (
@@ -171,13 +190,16 @@ def pressed(scene: Scene, skin: Skin) -> Pressed:
         height = np.min([_height_mm(part, 1e3 * body.depth_m, x, y) for part in load.parts], axis=0)
         near = tuple(_window(height < 3e3 * body.depth_m, axis, sheet.per) for axis in (1, 0))
         force[near] += Contact(skin.pitch_x_mm, body, height[near]).pressed(at(contact.force_n, 0.0))
-    touched = force > 0
-    split = (skin.rows, sheet.per, skin.columns, sheet.per)
+    return Patches(force, x, y, sheet.per)
+
+
+def pressed(scene: Scene, skin: Skin) -> Pressed:
+    """The forces and contacts of :func:`patches`."""
+    found = patches(scene, skin)
+    touched, x, y, step_mm = found.force_n > 0, found.x_mm, found.y_mm, tiles(skin.pitch_x_mm).step_mm
     bridged = ndimage.binary_closing(np.pad(touched, 2), np.ones((2, 2)))[2:-2, 2:-2]
-    found = (
-        _contacts(touched, ndimage.label(how, np.ones((3, 3)))[0], x, y, sheet.step_mm**2) for how in (touched, bridged)
-    )
-    return Pressed(force.reshape(split).sum(axis=(1, 3)), *found)
+    both = (_contacts(touched, ndimage.label(how, np.ones((3, 3)))[0], x, y, step_mm**2) for how in (touched, bridged))
+    return Pressed(found.cells_n, *both)
 
 
 def _height_mm(part: Part, depth_mm: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:

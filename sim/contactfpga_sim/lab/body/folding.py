@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga.robot.body.folds import STEP_RAD, Folds, cells_of, learn
+from contactfpga.robot.body.folds import STEP_RAD, Folds, learn
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
@@ -96,7 +96,7 @@ def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:
 
 
 def _zones(zones: Zones) -> list[np.ndarray]:
-    return [cells for zone in zones if (cells := cells_of(zones, zone)) is not None]
+    return [cells for zone in zones if (cells := zones.cells_of(zone)) is not None]
 
 
 def _marks(known: Folds, angle: float, cells: np.ndarray) -> list[bool]:

@@ -1,0 +1,1 @@
+"""Contact surfaces against the contacts that they hold."""
