@@ -19,9 +19,9 @@ from contactfpga.tools import cli
 from contactfpga.wire import protocol
 from contactfpga_sim.apps import errors, result_cache, speed, stats
 from contactfpga_sim.apps.errors import Blob
-from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
+from contactfpga_sim.lab.chart import compute, host, numbers, tables, times
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.chart.methods import METHODS, SHEETS
+from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes import contacts
@@ -253,31 +253,6 @@ def test_a_quantile_of_few_values_or_of_some_that_never_come_has_no_upper_end():
     assert stats.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
 
 
-def test_what_to_build_miscounts_least_over_all_families_and_has_a_cover():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    shares = {
-        method: np.mean([one.errors["total"]["miscounted"].mean for one in points if one.task.method == method])
-        for method in SHEETS
-    }
-    build = compute.to_build(points)
-    assert METHODS[build].cover is not None
-    assert shares[build] == min(share for name, share in shares.items() if METHODS[name].cover)
-
-
-@pytest.mark.slow
-def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    tasks = [task(checked=1), task("run, 10 mm, tiles", "bumper", 130)]
-    with ThreadPoolExecutor(2) as pool:
-        points = compute.study(tasks, pool, with_size=False)
-    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "others")
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        assert compute.study(tasks, client.get_executor(), with_size=False) == points
-
-
 @pytest.mark.slow
 def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, capsys):
     options = ["--no-size", "--jobs", "1", "--output"]
@@ -320,49 +295,3 @@ def test_the_page_shows_what_its_numbers_say(tmp_path):
         (tmp_path / folder).mkdir()
     for path in tables.draw(tmp_path / "images", points):
         assert path.read_text() == (ROOT / "docs" / path.relative_to(tmp_path)).read_text()
-
-
-def test_the_picture_of_the_front_has_its_methods_where_their_numbers_say():
-    points = numbers.read(ROOT / tables.NUMBERS)
-    axes, _ = front_picture.picture(points).axes
-    left, right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    marks = {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xydata()) == 1}
-    shown = [method for row in front_picture.ROWS.values() for method in row.methods.values()]
-    assert len(marks) == len(shown) == len(set(shown))
-    for line in csv.DictReader((ROOT / tables.NUMBERS).read_text(encoding="utf-8").splitlines()):
-        if line["family"] == "fingers" and line["method"] in shown:
-            x, y = float(line["touch_median_us"]) + float(line["host_us"]), 100 * float(line["total_miscounted"])
-            assert any((x, y) == pytest.approx(mark) for mark in marks), line["method"]
-            assert left < x < right
-            assert bottom < y < top
-            fast = (line["method"].startswith("reversal"), 24_000_000, 12_000_000)
-            skin = METHODS[line["method"]].skin
-            assert ((skin.clock_hz, skin.baud) == fast[1:]) == fast[0]  # as the legend says
-
-
-def test_what_is_never_felt_is_drawn_as_never():
-    points = [one for one in numbers.read(ROOT / tables.NUMBERS) if one.task.family == "palm"]
-    assert any(math.isinf(compute.reached_us(one)) for one in points)
-    panel = picture.picture(points).axes[0]
-    assert "never" in [label.get_text() for label in panel.get_xticklabels()]
-    assert picture.NEVER_US in [line.get_xdata()[0] for line in panel.lines if line.get_marker() in "sv^oD"]
-    rows = times_picture.picture(points).axes[0]
-    assert [label.get_text() for label in rows.get_yticklabels()] == [one.task.method for one in points]
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(7200)
-def test_the_pages_numbers_are_found_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "NUMBERS", tmp_path / "chart.csv")
-    for found, shown in zip(tables.compute(), numbers.read(ROOT / "docs/chart/chart.csv"), strict=True):
-        assert dataclasses.replace(found, host_us=shown.host_us) == shown
-
-
-@pytest.mark.slow
-def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
-    monkeypatch.setattr(tables, "SIDES", (16,))
-    monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
-    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in str(tables.host_table()).splitlines()[2:]}
-    # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
-    assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
