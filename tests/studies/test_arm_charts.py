@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import math
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 
 PAPER = Case.load("paper")
-PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -43,11 +41,6 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
     ends = ["arm-force.png", "arm-force.svg"]
     assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
-
-
-def test_charts_of_an_arm_at_rest_are_refused(capsys):
-    assert cli.main(["study", "arm", "--case", "push", "--charts"]) == 1
-    assert "behavior is 'comply' at 0 m/s" in capsys.readouterr().err
 
 
 @pytest.mark.slow

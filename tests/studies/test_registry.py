@@ -34,7 +34,7 @@ PLACES = [
 SECTIONS = [(study.name, name, section) for study in DECLARED for name, section in study.sections.items()]
 QUICK = {"cover", "failures", "haptics", "kits", "maker", "safety", "settle", "skin", "units"}
 """Studies whose samples `make test` makes; the other samples are for `make test-all`."""
-WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "performance",
+WHOLE = {"arm", "closed", "fit", "maker pulls", "maker series", "performance",
          "safety", "tracking scores"}  # fmt: skip
 """Studies, and sections, that `make campaign` makes whole; of a section that is named no sample is made."""
 SHOWN = [

@@ -17,7 +17,7 @@ from contactfpga import picture_style as style
 from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm import sweep
-from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
@@ -105,14 +105,6 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
             for name, latency in by_speed.items()
         },
     )
-
-
-def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case without charts."""
-    if case.control.behavior != "reverse" or not case.link.speed_m_s:
-        raise CaseError(
-            f"behavior is {case.control.behavior!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
-        )
 
 
 def draw(

@@ -24,7 +24,7 @@ PLACES = 60
 
 
 def add_flags(flag: flags.Flags) -> None:
-    flag("--case CASE", "Case to run: paper, paper-offset, push or a .toml file.", default="paper")
+    flag("--case CASE", "Case to run: paper, paper-offset or a .toml file.", default="paper")
     usual = "Latency from the switch to the controller (default: the paper's 6000)."
     flag("--latency-us US", usual, numbers.number(0, 1e7, "us"), 6000.0)
     places = "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place)."
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         return _charts(args, case)
     if args.force_threshold:
         return _units(args, case)
-    return _pushes(args, case) if case.control.behavior == "comply" else _contact(args, case)
+    return _contact(args, case)
 
 
 def _contact(args: argparse.Namespace, case: Case) -> int:
@@ -102,9 +102,8 @@ def _units(args: argparse.Namespace, case: Case) -> int:
     from contactfpga.tools.console import tables
     from contactfpga_sim.lab.arm import report
 
-    if args.skin is not None or case.control.behavior == "comply":
-        what = "--force-threshold runs its own Skin, with a case that reverses"
-        raise ContactFPGAError(f"{what}; leave --skin and such a case out")
+    if args.skin is not None:
+        raise ContactFPGAError("--force-threshold runs its own Skin; leave --skin out")
     lines = report.defense_lines(case)
     if args.json:
         results.show(args, [dict(zip(lines[0], line)) for line in lines[1:]])
@@ -128,26 +127,10 @@ def _regions(args: argparse.Namespace, case: Case) -> int:
     return 0
 
 
-def _pushes(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga.tools.console import tables
-    from contactfpga_sim.lab.arm import comply, report
-
-    fastest, pushes = comply.pushes(case)
-    if args.json:
-        known = {"case": args.case, "fastest_m_s": fastest, "pushes": pushes}
-        results.show(args, known)
-        return 0
-    title = f"Case {args.case}: pushed by {1e3 * case.touch[0].push_m:g} mm and let go"
-    tables.show(report.push_lines(pushes), title=title)
-    terminal.say(f"The torque stays below {case.control.torque_limit_nm:g} Nm up to a push of {fastest:.3f} m/s.")
-    return 0
-
-
 def _charts(args: argparse.Namespace, case: Case) -> int:
     from contactfpga_sim.apps.pool import executor, progress
     from contactfpga_sim.lab.arm import pictures, sweep
 
-    pictures.check(case)
     folder = outputs.folder(args.output)
     tasks = pictures.plan(case)
     so_far: dict[SweepTask, SweepPoint] = {}
