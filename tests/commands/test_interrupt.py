@@ -98,15 +98,6 @@ def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_pa
     interrupted(words, lambda terminal: f": {step}" in terminal.said, keys, tmp_path)
 
 
-@pytest.mark.campaign  # which has the tools for it
-@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
-def test_place_and_route_ends_too(keys, tmp_path):
-    def ready(terminal):
-        return any("yosys" in line or "nextpnr" in line for line in descendants(terminal.process.pid).values())
-
-    interrupted("build icebreaker --output OUT", ready, keys, tmp_path)
-
-
 WAITS = """
 import sys, time
 from contactfpga.tools.console import interrupt

@@ -50,16 +50,6 @@ def test_full_frames_of_some_sheets_arrive(connectivity, report):
         check(rows, columns, connectivity, report)
 
 
-@pytest.mark.campaign
-@pytest.mark.timeout(24 * 3600)
-@pytest.mark.parametrize("connectivity", [4, 8])
-@pytest.mark.parametrize("report", REPORTS)
-def test_full_frames_of_all_sheets_arrive(connectivity, report, record_property):
-    for rows, columns in SIZES:
-        check(rows, columns, connectivity, report)
-    record_property("cases", len(SIZES))
-
-
 def test_no_frame_is_too_long_for_the_reader(monkeypatch):
     """The limit that once stood here let frames of over 1,556 bytes never reach a program."""
     monkeypatch.setattr("contactfpga.driver.conversation.LONGEST_PACKET", 1556)

@@ -100,16 +100,6 @@ def fast():
     yield from made(campaign.skin("run").replace(send="on_change", scan="reversal", precharge_us=0.5))
 
 
-@pytest.mark.campaign  # which has a board of its own to compile
-@pytest.mark.parametrize("copy", ["first", "second"])
-@pytest.mark.parametrize("place", ["scan.frame_clock.time", "transmitter.shift", "scan.driver.selected"])
-def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
-    bit = Bit(place_of(dual.board, f"dual.{copy}.{place}"), 0, 2)
-    found = [flip.follow(dual, Flip(bit, dual.step_clocks * 24 + clock)) for clock in (17, 4321)]
-    assert {one.outcome for one in found} <= {"told", "masked"}
-    assert "restarts" in {one.kind for one in found}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "bits"),

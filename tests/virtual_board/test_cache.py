@@ -243,21 +243,3 @@ def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
         assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
         assert capsys.readouterr().err == f"contactfpga: {path} in the cache is damaged; it is made again\n"
     assert result_cache.cached("kind", "key", lambda: 5) == [1, 22]
-
-
-@pytest.mark.campaign  # it compiles a board in a cache of its own
-def test_the_cache_may_be_the_current_folder(tmp_path):
-    code = (
-        "from contactfpga.skin import Skin; from contactfpga_sim.model.board.compiled import CompiledBoard\n"
-        "with CompiledBoard(Skin(rows=2, columns=2)) as board: board.run(10)"
-    )
-    environment = os.environ | {"CONTACTFPGA_CACHE": "."}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=200)
-    assert done.returncode == 0, done.stderr
-    (library,) = tmp_path.glob("*.so")
-    assert mode(library) == 0o600
-    library.chmod(0o777)
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=200)
-    assert done.returncode != 0
-    assert "can be written by others (mode 777)" in done.stderr
