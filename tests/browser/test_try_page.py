@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from contactfpga.design import kits
 from contactfpga.design.cover import cells_of, load_cover
-from contactfpga_sim.lab.view import browser
+from contactfpga_sim.lab import browser
 
 pytestmark = [
     pytest.mark.slow,  # 30 to 60 s

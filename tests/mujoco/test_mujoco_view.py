@@ -13,8 +13,8 @@ import contactfpga
 from contactfpga.tools.view import chart, obstacle, opening
 from contactfpga.tools.view.fingers import Finger
 from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
+from contactfpga_sim.lab import browser
 from contactfpga_sim.lab.mujoco.clip import SteppedPace
-from contactfpga_sim.lab.view import browser
 
 HERE = contactfpga.examples() / "arm"
 ROBOT, SCENE, REFLEXES = (str(HERE / name) for name in ("pushed.toml", "scene.xml", "reflexes.py"))

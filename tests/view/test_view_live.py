@@ -19,7 +19,7 @@ CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circ
 
 @pytest.fixture(scope="module")
 def shown():
-    from contactfpga_sim.lab.view.browser import running
+    from contactfpga_sim.lab.browser import running
 
     with opening.opened(opening.ViewRequest("sim://?scene=nothing"), http_port=0) as shown, running(shown):
         yield shown
