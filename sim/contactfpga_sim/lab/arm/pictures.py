@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm import sweep
 from contactfpga_sim.lab.arm.case import Case
@@ -107,14 +105,9 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
     )
 
 
-def draw(
-    case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
-) -> list[Path]:
+def draw(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path) -> Path:
     with matplotlib.rc_context(style.SETTINGS):
-        figures = {
-            "arm-force": _force(case, tasks, found),
-        }
-        return [style.save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
+        return style.save(_force(case, tasks, found), folder / "arm-force.svg")
 
 
 def _axes(x: str, y: str) -> tuple[Figure, Any]:
@@ -163,15 +156,3 @@ def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figur
             line.set_label("_")
     figure.legend(loc="outside lower center", ncols=2)
     return figure
-
-
-def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
-    """Write a line per run, in SI units."""
-    names = [field.name for field in dataclasses.fields(SweepPoint)]
-    with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])
-        for task, point in found.items():
-            given = (task.latency_s, task.case.link.speed_m_s, task.case.control.torque_limit_nm)
-            table.writerow([task.way, *(f"{value:.6g}" for value in (*given, *dataclasses.astuple(point)))])
-    return path

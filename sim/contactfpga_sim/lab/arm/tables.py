@@ -49,8 +49,8 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
-    return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
+    chart = pictures.draw(Case.load("paper"), found.plan, found.points, folder)
+    return [*pictures.pictures(found.columns, folder, ("svg",)), chart]
 
 
 class Failure(NamedTuple):

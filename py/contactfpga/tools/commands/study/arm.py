@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga import terminal
@@ -11,12 +10,10 @@ from contactfpga.design.cover import BODIES, load_cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs, results
-from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.arm import anywhere
     from contactfpga_sim.lab.arm.case import Case
-    from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 EXTRA = "sim"
 
@@ -33,7 +30,6 @@ def add_flags(flag: flags.Flags) -> None:
     bodies = f"What the arm runs into: {', '.join(BODIES)} (default: the case's)."
     flag("--body BODY", bodies, tuple(BODIES))
     flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
-    flag("--charts", "Draw force against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
     flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
@@ -52,10 +48,6 @@ def run(args: argparse.Namespace) -> int:
         case, args.case = case.but(body=args.body), f"{args.case} against {args.body}"
     if args.regions:
         return _regions(args, case)
-    if args.charts:
-        if args.json:
-            raise ContactFPGAError("--charts only writes files, which it names; leave --json out")
-        return _charts(args, case)
     if args.force_threshold:
         return _units(args, case)
     return _contact(args, case)
@@ -125,31 +117,3 @@ def _regions(args: argparse.Namespace, case: Case) -> int:
     title = f"Case {args.case}: {case.link.speed_m_s:g} m/s, reaction after {1e3 * late:g} ms"
     tables.show([REGION_HEADS, *map(region_row, found)], title=title)
     return 0
-
-
-def _charts(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga_sim.apps.pool import executor, progress
-    from contactfpga_sim.lab.arm import pictures, sweep
-
-    folder = outputs.folder(args.output)
-    tasks = pictures.plan(case)
-    so_far: dict[SweepTask, SweepPoint] = {}
-    try:
-        with executor(args.jobs, args.dask) as workers, progress() as step:
-            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
-    except KeyboardInterrupt:
-        raise Interruption(_kept(so_far, len(tasks.all), folder)) from None
-    print(pictures.write_csv(found, folder / "arm-charts.csv"), flush=True)
-    for path in pictures.draw(case, tasks, found, folder):
-        print(path)
-    return 0
-
-
-def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    from contactfpga_sim.lab.arm import pictures
-
-    again = "run the same command again to go on from there"
-    if not found:
-        return f"interrupted before the first of {of} runs was finished; {again}"
-    path = pictures.write_csv(found, folder / "arm-charts-so-far.csv")
-    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"
