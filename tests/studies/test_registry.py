@@ -156,7 +156,7 @@ def test_a_section_shows_a_picture_or_at_most_eight_rows(study, name):
 MEASURED_ONCE = {"rivals-rivals.csv", "rivals-rivals_exact.csv", "rivals-rivals_made_of.csv", "chart-other_ways.csv",
                  "net-links.csv"}  # fmt: skip
 WRITTEN_ELSEWHERE = MEASURED_ONCE | {"formal-claims.csv", "mutants-alive.csv", "verification.csv"}
-"""By hand, by `make verification`, and from what scripts/rivals.py prints."""
+"""By hand, or by `make verification`."""
 
 
 def test_each_file_beside_the_pages_belongs_to_a_section():
