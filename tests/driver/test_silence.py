@@ -1,6 +1,5 @@
 """No data: silence is an error or an event, and never an empty sheet."""
 
-import asyncio
 import contextlib
 
 import pytest
@@ -115,24 +114,6 @@ def test_a_pulled_plug_is_no_silence(board, port):
     for one in (frames, events):
         with pytest.raises(contactfpga.PortLost, match="plug it in"):
             one.next()
-
-
-def test_async_iteration_sees_silence_too(board, port):
-    async def first_silence():
-        port.dead = True
-        async for event in board.events(deadline_s=0.05):
-            if isinstance(event, contactfpga.Silence):
-                return event
-        return None
-
-    assert asyncio.run(first_silence()).seconds == pytest.approx(0.05, abs=0.02)
-
-    async def first_error():
-        async for _ in board.subscribe(deadline_s=0.05):
-            pass
-
-    with pytest.raises(contactfpga.NoData):
-        asyncio.run(first_error())
 
 
 def test_the_latest_frame_may_not_be_older_than_asked_for(board, port):

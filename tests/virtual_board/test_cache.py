@@ -1,13 +1,11 @@
 """The cache of compiled gateware: what others could have written is not loaded."""
 
 import os
-import random
 import signal
 import stat
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -39,14 +37,6 @@ def test_modes_do_not_depend_on_the_umask(tmp_path, monkeypatch):
     result_cache.cached("kind", "key", lambda: 1)
     assert [mode(path) for path in (folder, folder.parent)] == [0o700] * 2
     assert {mode(path) for path in folder.iterdir()} == {0o600}
-
-
-def test_a_umask_that_takes_everything_is_no_trouble(tmp_path):
-    before = os.umask(0o777)
-    try:
-        assert mode(cache.ready(tmp_path / "a" / "b")) == 0o700
-    finally:
-        os.umask(before)
 
 
 @pytest.mark.parametrize("bits", [0o777, 0o770, 0o722, 0o1777])
@@ -108,13 +98,6 @@ def test_a_folder_in_one_of_another_user_is_refused(tmp_path, depth):
     assert cache.ready(folder) == folder
 
 
-def test_what_belongs_to_root_is_trusted_by_all(monkeypatch):
-    monkeypatch.setattr(os, "geteuid", lambda: OTHER)
-    root = Path("/usr")
-    assert root.stat().st_uid == 0
-    assert cache.ready(root) == root
-
-
 @pytest.mark.parametrize("bits", [0o666, 0o620, 0o602])
 def test_a_library_that_others_can_write_is_refused(tmp_path, bits):
     library = tmp_path / "x.so"
@@ -134,12 +117,6 @@ def test_links_are_not_followed(tmp_path):
     with pytest.raises(CacheError, match=r"x\.lock in the cache cannot be opened"), cache.locked(tmp_path / "x.lock"):
         pass
     assert target.read_text() == "x"
-
-
-def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(CacheError, match=r"cannot be used: .*; name another folder with CONTACTFPGA_CACHE"):
-        cache.ready(tmp_path / "file" / "cache")
 
 
 def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
@@ -188,20 +165,11 @@ def answer(folder):
     return done.returncode, done.stdout.split(), done.stderr
 
 
-def damages():
-    yield "emptied", lambda data: b""
-    yield from ((f"cut to {size}", lambda data, size=size: data[:size]) for size in (63, 3000))
-    yield "cut by a byte", lambda data: data[:-1]
-    yield "longer", lambda data: data + b"\0"
-    rng = random.Random(5)
-    for share in (0.0, rng.random(), 0.9999):
-        bit = 1 << rng.randrange(8)
-
-        def flipped(data, share=share, bit=bit):
-            at = int(share * len(data))
-            return data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
-
-        yield f"flipped at {share:.2f}", flipped
+DAMAGES = {
+    "emptied": lambda data: b"",
+    "cut by a byte": lambda data: data[:-1],
+    "flipped in the middle": lambda data: data[:5000] + bytes([data[5000] ^ 4]) + data[5001:],
+}
 
 
 def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
@@ -209,7 +177,7 @@ def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
     assert answer(tmp_path) == (0, ["42"], "")
     (library,) = tmp_path.glob("*.so")
     good = library.read_bytes()
-    for what, damaged in damages():
+    for what, damaged in DAMAGES.items():
         library.write_bytes(damaged(good))
         warning = f"contactfpga: {library} in the cache is damaged; it is made again\n"
         assert answer(tmp_path) == (0, ["built", "42"], warning), what
