@@ -126,14 +126,6 @@ def test_a_link_that_leads_elsewhere_is_not_replaced(tmp_path):
     assert os.readlink(link) == str(tmp_path / "precious")
 
 
-@pytest.mark.slow
-def test_what_a_killed_board_left_is_replaced(tmp_path):
-    link = tmp_path / "port"
-    link.symlink_to("/dev/pts/12345")
-    PtyBoard(SLOW, link=link).stop()
-    assert not link.is_symlink()
-
-
 # ---- terminals
 
 
