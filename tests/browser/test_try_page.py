@@ -287,21 +287,6 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
     same(page, 1)
 
 
-def test_slow_motion_jumps_from_event_to_event_for_who_wants_no_motion(visit):
-    page = visit(reduced_motion="reduce")
-    stops = set(stopped_at(page))
-    page.locator("#play").click()
-    seen = set()
-    while len(seen) < 4:
-        seen.add(page.input_value("#cursor"))
-        page.wait_for_timeout(30)
-    assert seen <= stops
-    page.emulate_media(reduced_motion="no-preference")
-    expect(page.locator("#play")).to_have_text("Pause")
-    looks = (page.input_value("#cursor") for _ in range(PATIENCE_MS // 40) if not page.wait_for_timeout(40))
-    assert any(cursor not in stops for cursor in looks)
-
-
 def stopped_at(page):
     """What the page says at each stop of slow motion, by the slider's value, from the last byte back to the touch."""
     found = {}

@@ -309,27 +309,6 @@ def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
     assert by_c(decoder, data) == by_python(data)
 
 
-def test_sweeps_out_of_time_are_counted_and_not_shown(decoder):
-    """One before the first frame, one at the time of another, an older one; then other converters, and a restart."""
-    board = ModelBoard(Skin(rows=5, columns=4, units=3))
-    wire, hello = board.wire, board.hello()
-    data = hello + wire.sweep([1, 2, 3], 100, 3)
-    data += board.frame() + b"".join(
-        wire.sweep([1, 2, 3], time_us, sequence) for time_us, sequence in [(200, 5), (200, 6), (150, 7), (300, 9)]
-    )
-    facts = wire.facts()
-    facts[9] = facts[9][:4] + struct.pack("<HI", 5, 700)
-    data += wire.hello(sent=1, facts=facts) + wire.sweep([1, 2, 3], 120, 10)
-    board.power_up()
-    data += board.hello() + board.frame() + wire.sweep([0, 4095, 3], 100, 200)
-    said = by_c(decoder, data)
-    assert said == by_python(data)
-    assert [line.split()[1:3] for line in said if line.startswith("sweep ")] == [
-        *(["200", "5"], ["300", "9"], ["120", "10"], ["100", "200"])
-    ]
-    assert "sweeps=7 sweeps_lost=2 sweeps_unexplained=3" in said[-1]
-
-
 @pytest.mark.parametrize(
     ("field", "value", "taken"),
     [

@@ -151,6 +151,17 @@ def test_each_touch_of_four_links_is_where_mujoco_has_it(robot):
     assert normals.min() > 0.98
 
 
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_the_places_of_480_touches_are_as_the_page_says(robot):
+    """docs/collisions.md: 60 poses."""
+    errors, stated, normals = felt(robot, 100, 60)
+    rms = [float(np.sqrt(np.mean(each**2))) for each in (errors, stated)]
+    turned = np.degrees(np.arccos(np.minimum(1.0, normals)))
+    found = [np.mean(errors), np.quantile(errors, 0.95), errors.max(), *rms, turned.max()]
+    assert found == pytest.approx([3.6, 5.8, 6.8, 3.7, 5.1, 8.5], abs=0.051)
+
+
 def test_the_forces_of_units_are_mujocos(robot):
     """One push, and two, on the chest: each within 10 %, by what the units' noise and the places leave open."""
     rng, skin = np.random.default_rng(1), Body.load(with_units(robot)).links["chest"].skin

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from amaranth.back import rtlil
-from fits import BUMPER, HANDS, chosen
-from recorded_frames import path_of
+from fits import BUMPER, HANDS
 from study_pages import section
 
 from contactfpga.skin import Skin
@@ -110,11 +109,3 @@ def test_the_page_shows_what_the_examples_say(name):
     assert command.startswith("contactfpga fit examples/")
     assert command in (ROOT / command.split()[2]).read_text()
     assert (text.count("| the answer |"), text.count("| runner-up |")) == (2, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.recordings
-def test_real_contacts_need_an_exact_labeller(shortcuts):
-    found = chosen(str(path_of("dtmf16x16")), pitches=None, latency_us=None)
-    assert found.answer.skin.labeller == "serial"
-    assert found.answer.skin.connectivity == 8

@@ -86,6 +86,17 @@ def test_a_stuck_switch_is_found_in_the_time_stated(report, seed):
         assert watch.mask_line == f"mask = [[{spot[0]}, {spot[1]}]]"
 
 
+@pytest.mark.campaign
+@REPORTS
+@pytest.mark.parametrize("seed", range(1000, 1060))
+def test_what_the_page_says_of_random_histories(report, seed):
+    rng, skin = np.random.default_rng(seed), SKINS[report]
+    touches = moving_touches(rng, skin, 40.0, hands=1 if report != "cells" else 3)
+    assert watched(skin, touches)[0] == []
+    spot = tuple(rng.integers(0, 16, 2).tolist())
+    assert {one.cells for one in watched(skin, stuck_at(touches, spot))[0]} == {(spot,)}
+
+
 def test_a_watch_keeps_up_with_10000_frames_per_s():
     """Of cells that change in each frame, by the processor's time."""
     cells = moving_touches(np.random.default_rng(9), CELLS, 20.0, rate_hz=100.0)
