@@ -206,19 +206,6 @@ def test_two_fingers_touch_at_once_and_leave(visit):
     expect(page.locator("#headline")).to_have_text("Nothing touches it")
 
 
-def test_a_pen_says_how_hard_it_presses(visit):
-    page = visit()
-    lifted(page)
-    x, y = pixel(page, 32, 32)
-    pen = {"x": x, "y": y, "button": "left", "buttons": 1, "pointerType": "pen", "clickCount": 1}
-    session = page.context.new_cdp_session(page)
-    for force in (0.25, 0.75):
-        kind = "mousePressed" if force == 0.25 else "mouseMoved"
-        session.send("Input.dispatchMouseEvent", {**pen, "type": kind, "force": force})
-        expect(page.locator("#force-value")).to_have_text(f"{10 * force:.1f} N")
-        same(page, 1)
-
-
 def test_keys_put_move_resize_and_lift_a_finger(visit):
     page = visit()
     lifted(page)

@@ -3,6 +3,7 @@ Ctrl-C end with status 0."""
 
 import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -57,6 +58,19 @@ def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
 
     started = time.monotonic()
     interrupted(f"{POOLS[name]} --jobs 2", ready, keys, tmp_path)
+
+
+@pytest.mark.slow
+def test_what_was_done_is_kept(tmp_path):
+    def ready(terminal):
+        return any(int(done) >= 3 for done in re.findall(r"(\d+)/\d+", terminal.said))
+
+    said = interrupted("study chart --placements 12 --no-size --jobs 2 --output OUT", ready, True, tmp_path)
+    (kept,) = (tmp_path / "out").iterdir()
+    lines = kept.read_text().splitlines()
+    assert "-so-far." in kept.name
+    assert len(lines) > 3
+    assert f"interrupted; {len(lines) - 1} of " in said
 
 
 BUILDS = (

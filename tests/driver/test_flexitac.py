@@ -1,6 +1,7 @@
 """The foreign sheet FlexiTac: its bytes as zones, and what becomes of bytes that are lost or wrong."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -118,6 +119,18 @@ def test_it_says_hello_by_itself_as_boards_do_and_keeps_the_hosts_time(simulated
     assert (stats.lost, stats.restarts, stats.unexplained, sum(stats.damaged.values())) == (0, 0, 0, 0)
 
 
+def test_lost_bytes_lose_frames_and_no_frame_is_shifted():
+    """One of 2,000 bytes is lost, so that one of four frames of 514 bytes is damaged: these are lost, and no other is
+    shifted."""
+    touch = Touch((8, 16))
+    with FlexitacSheet(touch, lost=1 / 2000) as sheet, contactfpga.open(address_of(sheet), timeout=LONG) as board:
+        frames, stats = frames_of(board, sheet, touch, 60), board.stats
+    touched = [frame for frame in frames if len(frame)]
+    assert all([(zone.x_mm, zone.y_mm) for zone in frame] == [(48.0, 24.0)] for frame in touched)
+    damaged = sum(stats.damaged.values())
+    assert 0.08 < damaged / (damaged + stats.frames) < 0.4
+
+
 def test_a_wrong_byte_is_one_cell_of_one_frame_or_costs_the_frame():
     framer, sheet = Framer(512), FlexitacSheet(Touch(), seed=3)
     whole = [sheet.frame(0.0) for _ in range(200)]
@@ -145,6 +158,15 @@ def test_frames_do_not_depend_on_how_bytes_are_cut(size):
     cut = [frame for at in range(0, len(stream), size) for frame in framer.take(stream[at : at + size])]
     assert [one for one in cut if one is not None] == [one for one in whole if one is not None]
     assert 5 < sum(one is not None for one in whole) < 30
+
+
+def test_noise_costs_bounded_memory_and_time():
+    framer, started = Framer(512), time.process_time()
+    for seed in range(20):
+        framer.take(np.random.default_rng(seed).integers(0, 256, 65_536, dtype=np.uint8).tobytes())
+        assert len(framer._rest) < 3 * 514
+    framer.take(MARK * 30_000)
+    assert time.process_time() - started < 5.0
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import pytest
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga.driver import health
 from contactfpga.driver.events import longest_pause_s
 from contactfpga.tools.console import live
 from contactfpga.wire.faults import Faults
@@ -232,16 +231,3 @@ def test_a_display_shows_silence_in_the_place_of_a_table_that_stands_still(board
     with pytest.raises(contactfpga.ReadTimeout):
         list(shown)
     assert board.silence.seconds >= 1.0
-
-
-def test_doctor_names_lines_and_the_age_of_the_last_frame(board, port):
-    port.word = 1 << 3 | 1 << 34
-    port.out += port.report() + port.frame(flags=["fault"])
-    zones = next(zones for zones in board if zones.faults)
-    port.dead = True
-    port.seconds += 0.5
-    found = [(one.verdict, one.sentence) for one in health.lines(board, zones)]
-    assert found[0][0] == "ok"
-    assert found[0][1].endswith(" ms ago")
-    assert [one[1].split(":")[0] for one in found[1:]] == ["column 2 stuck", "row 3 open"]
-    assert {one[0] for one in found[1:]} == {"fault"}

@@ -140,12 +140,6 @@ def test_what_time_was_too_short_for_is_open_and_neither_reported_nor_proved(mon
 
 
 @pytest.mark.slow
-def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
-    untouched = Stimulus("untouched", Timeline([]), 12_000)
-    assert len(campaign.left_by(sample.skin, sample.mutants, [untouched])) > 2 * len(sample.left)
-
-
-@pytest.mark.slow
 def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
     model = netlist.model(sample.skin, sample.mutants)
     stimulus = next(stimuli.quick(sample.skin))

@@ -225,17 +225,6 @@ def test_a_touch_that_closes_nothing_takes_forever():
     assert found.not_felt.mean == pytest.approx(2 / 3)
 
 
-@pytest.mark.slow
-def test_switches_that_close_one_after_the_other_go_through_the_gateware(monkeypatch):
-    skin, cover = METHODS["run, 20 mm, tiles"]
-    scenes = touches("edge", 3, 5, skin, cover)
-    assert max(len(times.closing(scene, skin, cover)[1]) for scene in scenes) > 1
-    times.measured(scenes, skin, cover, 0, checked=3)
-    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: predict(skin.replace(settle_us=6.0), *rest))
-    with pytest.raises(Mismatch):
-        times.measured(scenes, skin, cover, 0, checked=1)
-
-
 @pytest.mark.parametrize("share", [0.5, 0.95])
 def test_the_interval_of_a_quantile_holds_it_95_times_of_100(share):
     rng = np.random.default_rng(6)
@@ -251,6 +240,20 @@ def test_a_quantile_of_few_values_or_of_some_that_never_come_has_no_upper_end():
     felt = [float(value) for value in range(180)]
     assert math.isinf(stats.quantile([*felt, *[math.inf] * 20], 0.95).value)
     assert stats.quantile([*felt, *[math.inf] * 20], 0.5).value == 99
+
+
+@pytest.mark.slow
+def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    tasks = [task(checked=1), task("run, 10 mm, tiles", "bumper", 130)]
+    with ThreadPoolExecutor(2) as pool:
+        points = compute.study(tasks, pool, with_size=False)
+    monkeypatch.setattr(result_cache, "cache_folder", lambda: tmp_path / "others")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert compute.study(tasks, client.get_executor(), with_size=False) == points
 
 
 @pytest.mark.slow

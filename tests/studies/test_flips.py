@@ -133,22 +133,6 @@ def test_a_queue_that_lost_its_place_is_right_again(plain, place):
         assert [one.said for one in heard][-30:] == right[-30:]
 
 
-@pytest.mark.slow
-def test_contact_is_high_from_a_restart_until_a_frame_after_it():
-    board = state.StateBoard(PLAIN, ("contact", "received"))
-    board.press(np.zeros((4, 4), bool))
-    board.run(10_003)
-    assert board.take("contact")["data"].tolist() in ([], [0])
-    board.flip(Bit(place_of(board, "scan.frame_clock.time"), 0, 20))
-    board.run(10_000)
-    rises, falls = board.take("contact")
-    assert (rises["data"], falls["data"]) == (1, 0)
-    assert rises["cycle"] - 10_003 <= 3
-    scan = PLAIN.derived.frame_clocks
-    assert scan < falls["cycle"] - rises["cycle"] < 2 * scan + 100
-    board.close()
-
-
 def fake(send="always"):
     """Four sheets of 5 ms, and frames that come half a millisecond after their scan."""
     skin = Skin(rows=4, columns=4, send=send)

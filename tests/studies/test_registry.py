@@ -261,19 +261,6 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     assert len(stale()) == 2
 
 
-@pytest.mark.slow
-def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
-    from contactfpga_sim.apps import size
-    from contactfpga_sim.lab.closed import tables
-
-    monkeypatch.setattr(size.result_cache, "cached", None)  # nothing is measured
-    closed, skin_of = STUDIES["closed"], tables.skin_of
-    before = fingerprints.fingerprint(closed, "closed_size")
-    assert fingerprints.fingerprint(closed, "closed_size") == before
-    monkeypatch.setattr(tables, "skin_of", lambda *given: skin_of(*given).replace(columns=12))
-    assert fingerprints.fingerprint(closed, "closed_size") != before
-
-
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):
     whole = studies.STUDIES["toy"]
     lacking = Study("toy", title="Toys", page="toy.md", minutes=1, needs=("no-such-program", "no/such/folder"))

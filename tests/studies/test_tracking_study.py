@@ -85,6 +85,14 @@ def test_on_the_page_it_is_behind_no_other_at_any_rate():
             assert gained + half >= 0, row
 
 
+def test_on_the_page_it_is_ahead_in_the_mean_at_each_rate():
+    lines = section("tracking.md", "scores").splitlines()
+    means = [line[2:-2].split(" | ") for line in lines if line.startswith("| mean of all | ")]
+    assert [row[1] for row in means] == ["25", *PAGE_RATES]
+    for ours, *others in ([float(cell.strip("*")) for cell in row[2:6]] for row in means):
+        assert ours > max(others)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_contact_keeps_its_id_at_five_frames_per_second(name):
     cells = np.zeros((16, 16), bool)

@@ -82,6 +82,29 @@ def test_every_phase_is_that_of_a_chip_stepped_frame_by_frame(seed):
         assert found == pytest.approx(brute(settings, MHZ, line, byte, phase), abs=1e-6)
 
 
+@pytest.mark.parametrize("event", [0, None])
+def test_the_chip_that_is_stepped_sends_the_same(event):
+    settings = BridgeSettings(FAST, 1, event)
+    line = stream(*(packet(1152 * number, 17) for number in range(-40, 40)), until=80_000)
+    byte = 17 * 60 + 16
+    late = delivered(settings, CLOCK_HZ, line, byte)
+    for place in range(0, len(late.low), 7):
+        middle = (late.low[place] + late.high[place]) / 2
+        share = np.cumsum(late.weight)[place] - late.weight[place] / 2
+        phase = (line.since + settings.period_us * MHZ * share) / MHZ
+        chip = BridgeChip(FAST.payload_bytes, 1000, event, sent=phase - 1000)
+        for time, value in zip(line.times / MHZ, line.values):
+            chip.put(time, int(value))
+        before, at = 0, phase
+        while before <= byte:
+            packets = chip.take(at)
+            sizes = list(itertools.accumulate(map(len, packets), initial=before))
+            before, at = sizes[-1], at + 125
+        there = next(number for number, size in enumerate(sizes) if size > byte)
+        bus = sum(settings.packet_us(len(one)) for one in packets[:there])
+        assert at - 125 + bus == pytest.approx(middle, abs=1e-6)
+
+
 def test_a_delimiter_that_is_the_first_byte_of_its_packet_closes_none():
     """AN232B-04, "Event Characters"; it is what the worst phase of a single packet costs."""
     chip = BridgeChip(FAST.payload_bytes, 1000, 0)

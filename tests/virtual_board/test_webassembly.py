@@ -201,6 +201,13 @@ sys.exit(main())
 """
 
 
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", carried.keys())
+def test_the_files_are_built_again_in_the_same_bytes(name):
+    pytest.importorskip("ziglang")
+    assert carried.build(name) == webassembly.path_of(name).read_bytes()
+
+
 def alone(cache, *words, hidden=""):
     """Output of a command on a machine without a compiler or any other program."""
     command = [sys.executable, "-c", HIDDEN, hidden, *words]
