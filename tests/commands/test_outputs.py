@@ -1,4 +1,4 @@
-"""Where results are written is looked at before the work; what was worked out is not lost."""
+"""Where results are written is looked at before the work."""
 
 import os
 

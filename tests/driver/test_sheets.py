@@ -1,4 +1,4 @@
-"""Frames of sheets of every size, full to the last zone, through the whole driver."""
+"""Frames of sheets of many sizes, full to the last zone, through the whole driver."""
 
 import itertools
 import random

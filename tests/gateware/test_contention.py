@@ -1,4 +1,4 @@
-"""Lines that are driven against each other are reported, by each sheet that the gateware is simulated with."""
+"""Lines that are driven against each other are reported by the sheet that the gateware is simulated with."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The UART's two halves, level by level."""
+"""The UART's receiver, level by level; the transmitter is proved."""
 
 import pytest
 from wire import line

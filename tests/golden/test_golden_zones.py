@@ -1,4 +1,4 @@
-"""The golden model's zones and labeller timing: third opinions, known shapes, and the rule worked by hand."""
+"""The golden model's zones and labeller timing: third opinions, known shapes, and the rule worked cell by cell."""
 
 import cv2
 import numpy as np

@@ -97,7 +97,7 @@ def tests(tmp_path, monkeypatch):
     return tests
 
 
-GOOD, BAD, LONG = "def test_good():\n    pass\n\n\n", "def test_bad():\n    assert 0\n\n\n", "def test_long():\n    "
+GOOD, BAD = "def test_good():\n    pass\n\n\n", "def test_bad():\n    assert 0\n\n\n"
 
 
 def test_claims_share_the_time_that_others_did_not_need(monkeypatch):

@@ -168,6 +168,7 @@ def test_what_a_file_says_is_what_is_read(load):
         ),
         (DISC.replace("10", "0"), "contact 1: radius_mm is 0; it must lie between 0.01 and 100000"),
         (DISC.replace("10", "[9, 8]"), "contact 1: radius_mm is [9, 8]; the least comes first"),
+        (DISC + "number = [3, 2]", "contact 1: number is [3, 2]; it must be 1 or more"),
         (DISC + "number = 0", "contact 1: number is 0; it must be 1 or more, or [least, most]"),
         (DISC + "number = 65", "contact 1: number is 65; it must lie between 0 and 64"),
         (DISC + "x_mm = {seconds = 1}", "contact 1: x_mm is {'seconds': 1}; it must be {seconds = [...], values"),

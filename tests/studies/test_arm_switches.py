@@ -1,4 +1,4 @@
-"""Switches under the arm's cover, one by one, and pushes over time."""
+"""Switches under the arm's cover, one by one."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The cheapest Skin that meets the limits: against a search that tries everything, and in other orders."""
+"""The cheapest Skin that meets the limits: against a search that tries everything."""
 
 import itertools
 import math

@@ -17,7 +17,6 @@ from contactfpga_sim.model.board import native, state
 from contactfpga_sim.model.board.state import Bit
 
 PLAIN = Skin(rows=4, columns=4, labeller="serial", fail_safe=True, clock_hz=4_000_000, baud=1_000_000)
-DUAL = PLAIN.replace(dual=True, fail_safe=False)
 
 
 def made(skin):
@@ -34,11 +33,6 @@ def made(skin):
 @pytest.fixture(scope="module")
 def plain():
     yield from made(PLAIN)
-
-
-@pytest.fixture(scope="module")
-def dual():
-    yield from made(DUAL)
 
 
 def place_of(board, name):

@@ -1,4 +1,4 @@
-"""Where force joined to location fails: the breaks that the page states, found again; and end to end."""
+"""Where force joined to location fails: the breaks that the page states, found again."""
 
 import dataclasses
 import functools

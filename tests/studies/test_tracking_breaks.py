@@ -72,9 +72,6 @@ def test_fingers_of_the_breaks_close_the_switches_that_the_scenes_fingers_do(rng
         assert (breaks.under(np.array([x]), y)[0] == finger.cells(0.0, breaks.WIDE)).all()
 
 
-PITCH_MM, RADIUS_MM, GATE_MM = 10.0, 8.0, 20.0
-
-
 CLOSED = [(name, method) for name, knob in breaks.KNOBS.items() for method in knob.closed]
 
 

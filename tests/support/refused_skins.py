@@ -22,14 +22,20 @@ REFUSED = [
     ({"columns": 2, "column_order": [1, 0, 2]}, "column_order must hold each line from 0 to 1 once; it has 3"),
     # pressure units
     ({"units": 9}, "units is 9; MCP3208 has 8 channels"),
+    ({"units": -1}, "units is -1; MCP3208 has 8 channels"),
     (
         {"units": 2, "converter": "ads"},
         "converter is 'ads'; it must be one of 'mcp3208', 'ads131m08', or 'module:attribute' of your own",
     ),
     ({"units": 2, "converter_v": 2.5}, "converter_v is 2.5; MCP3208 needs 2.7 to 5.5 V"),
+    ({"units": 2, "converter_v": 6}, "converter_v is 6.0; MCP3208 needs 2.7 to 5.5 V"),
     ({"converter_v": 5.0}, "converter_v is 5.0; leave it out, or set units"),
     ({"unit_sums": [[1]]}, "unit_sums holds [1]; it must hold a weight for each of 0 units, not all 0"),
     ({"unit_sums": 3}, "unit_sums is 3; it must be a list of at most 4 lists of weights"),
+    (
+        {"units": 1, "unit_sums": [[1]] * 5},
+        "unit_sums is [[1], [1], [1], [1], [1]]; it must be a list of at most 4 lists of weights",
+    ),
     ({"units": 1, "unit_sums": [[0]]}, "unit_sums holds [0]; it must hold a weight for each of 1 units, not all 0"),
     ({"units": 2, "unit_sums": [[1]]}, "unit_sums holds [1]; it must hold a weight for each of 2 units, not all 0"),
     ({"units": 2, "unit_sums": [[1, 128]]}, "unit_sums holds [1, 128]; weights are whole numbers from -127 to 127"),
@@ -70,6 +76,7 @@ REFUSED = [
     ({**CLOSED, "diodes": "none", "connectivity": 4}, "diodes is 'none'; closed = true needs 'col2row' or 'row2col'"),
     # its mask
     ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
+    ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
     ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
     # scan and debounce
@@ -174,6 +181,8 @@ REFUSED = [
         "shift_hz is 4000000; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'",
     ),
     # clock and line
+    ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 401_000_000}, "clock_hz is 401000000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"baud": 7_000_000}, "baud is 7000000; it must lie between 1200 and 6000000 for this clock"),
     (

@@ -1,4 +1,4 @@
-"""Forces in the view: the mouse's finger presses simulated units, and its force is drawn where it presses."""
+"""Forces in the view are drawn where they press."""
 
 from pathlib import Path
 from types import SimpleNamespace

@@ -13,7 +13,7 @@ from view_page import Page, camera, click, drag
 import contactfpga
 from contactfpga.tools.view import opening
 
-CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circles"
+CELLS, BARYCENTERS = "/sheet/cells", "/sheet/barycenters"
 
 
 @pytest.fixture(scope="module")
