@@ -125,6 +125,14 @@ def test_a_link_that_leads_elsewhere_is_not_replaced(tmp_path):
 # ---- terminals
 
 
+@pytest.mark.slow
+def test_what_a_killed_board_left_is_replaced(tmp_path):
+    link = tmp_path / "port"
+    link.symlink_to("/dev/pts/12345")
+    PtyBoard(SLOW, link=link).stop()
+    assert not link.is_symlink()
+
+
 @pytest.mark.parametrize(
     ("text", "shown"),
     [

@@ -150,6 +150,20 @@ def test_after_any_forged_message_a_reader_goes_on_within_a_second(seed):
         assert not late, "what was forged and not believed costs nothing"
 
 
+def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
+    rng, counters = random.Random(1), NetCounters()
+    sender, stream = Sender(rng), Stream(counters)
+    assert stream.take(sender.send(b"abc", 0.0), 0.0) == [], "the first one, until another bears it out"
+    assert stream.take(sender.send(b"def", 0.1), 0.1) == [(b"abc", False), (b"def", False)]
+    sender.send(b"12345", 0.2)
+    sender.send(b"67", 0.3)
+    assert stream.take(sender.send(b"ghi", 0.4), 0.4) == []
+    sender.send(b"8", 0.5)
+    assert stream.take(sender.send(b"jkl", 0.6), 0.6) == [(b"\0ghi", False)]
+    assert stream.take(sender.send(b"mno", 0.7), 0.7) == [(b"\0jkl", False), (b"mno", False)]
+    assert (counters.lost_messages, counters.lost_bytes, counters.breaks, counters.messages) == (3, 8, 0, 5)
+
+
 @pytest.mark.parametrize("step_s", [-0.001, -3600.0, 2.1, 3600.0])
 def test_a_step_of_the_publishers_clock_is_a_break(step_s):
     """Or its process stood still, and its port ran over meanwhile: the same from here."""

@@ -150,18 +150,6 @@ def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
 
 
 @pytest.mark.campaign
-def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
-    skin = SKINS["4x4, fast"]
-    mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=1)
-    left = campaign.left_by(skin, mutants, stimuli.quick(skin))
-    killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
-    noticed = [killed[stage] for stage in ("label", "link")]
-    proved = proof.equivalent(skin, [*noticed, *left[:6]], limit_s=4)
-    assert not any(proved[: len(noticed)])
-    assert any(proved[len(noticed) :])
-
-
-@pytest.mark.campaign
 def test_a_design_whose_memories_are_no_powers_of_two_deep_can_be_asked_about():
     skin, stages = OPTIONS["5x5, closed, serial"]
     mutant = next(one for one in netlist.candidates(skin) if one.stage in stages)

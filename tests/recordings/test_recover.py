@@ -143,6 +143,19 @@ WAYS = {
 }
 
 
+@pytest.mark.parametrize("limit", [0, 1000])
+def test_a_full_disk_before_the_first_message_leaves_no_file(tmp_path, limit):
+    """There would be nothing in it to recover."""
+    file = tmp_path / "x.mcap"
+    with FakeBoard(SKIN) as board:
+        process = record(file, board.path, preexec_fn=limited(limit), env=UNKEPT)
+        _, errors = process.communicate(timeout=LONG)
+    assert process.returncode == 1
+    assert "nothing was recorded. Make room, then record again" in " ".join(errors.split())
+    assert "--recover" not in errors
+    assert not file.exists()
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_whole_files_are_read_however_they_are_written(tmp_path, capsys, way):
     ports, _ = recorded_both(tmp_path / "x.mcap")
