@@ -1,4 +1,4 @@
-"""The view in a headless browser."""
+"""The view in a headless browser, for tests."""
 
 from __future__ import annotations
 
