@@ -3,6 +3,7 @@
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
 REFUSED = [
+    ({"name": 7}, "name is 7; it must be a string"),
     ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
     ({"name": "ä" * 17}, f"name is '{'ä' * 17}', 34 bytes of UTF-8; at most 32 are possible"),
     # faults
@@ -41,10 +42,13 @@ REFUSED = [
     ({"units": 2, "unit_sums": [[1, 128]]}, "unit_sums holds [1, 128]; weights are whole numbers from -127 to 127"),
     # the sheet
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
+    ({"rows": True}, "rows is True; it must be a whole number"),
+    ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
     ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
     ({"pitch_x_mm": 0}, "pitch_x_mm is 0.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_y_mm": 1001}, "pitch_y_mm is 1001.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_x_mm": float("nan")}, "pitch_x_mm is nan; it must be a finite number"),
+    ({"connectivity": 8.0}, "connectivity is 8.0; it must be one of 4, 8"),
     ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
     ({"mask": [(0, 1.0)]}, "mask holds (0, 1.0); it must hold [row, column] pairs"),
     # its surface
@@ -75,6 +79,7 @@ REFUSED = [
     ),
     ({**CLOSED, "diodes": "none", "connectivity": 4}, "diodes is 'none'; closed = true needs 'col2row' or 'row2col'"),
     # its mask
+    ({"mask": [3]}, "mask holds 3; it must hold [row, column] pairs"),
     ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
     ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
     ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
