@@ -169,14 +169,3 @@ print(board.stats.bytes)
     status, count = run(program, board.path, file).splitlines()
     assert status == "[0, 0]"
     assert file.stat().st_size == int(count)
-
-
-@pytest.mark.slow
-def test_sheets_of_one_port_in_a_child():
-    program = """
-from contactfpga.driver import sheets
-board = contactfpga.open("sim://?sheets=examples/two-sheets.toml#0")
-print(child(lambda: (refused(board.read), board.close())), len(sheets._open))
-board.read()
-"""
-    assert run(program, "") == "0 1\n"

@@ -39,6 +39,14 @@ def test_modes_do_not_depend_on_the_umask(tmp_path, monkeypatch):
     assert {mode(path) for path in folder.iterdir()} == {0o600}
 
 
+def test_a_umask_that_takes_everything_is_no_trouble(tmp_path):
+    before = os.umask(0o777)
+    try:
+        assert mode(cache.ready(tmp_path / "a" / "b")) == 0o700
+    finally:
+        os.umask(before)
+
+
 @pytest.mark.parametrize("bits", [0o777, 0o770, 0o722, 0o1777])
 @pytest.mark.parametrize("named", [False, True])
 def test_a_folder_that_others_can_write_is_refused(tmp_path, monkeypatch, bits, named):
@@ -96,6 +104,13 @@ def test_a_folder_in_one_of_another_user_is_refused(tmp_path, depth):
         cache.ready(folder)
     other.chmod(0o1777)
     assert cache.ready(folder) == folder
+
+
+def test_what_belongs_to_root_is_trusted_by_all(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: OTHER)
+    root = Path("/usr")
+    assert root.stat().st_uid == 0
+    assert cache.ready(root) == root
 
 
 @pytest.mark.parametrize("bits", [0o666, 0o620, 0o602])
