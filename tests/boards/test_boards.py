@@ -199,16 +199,10 @@ def test_an_external_bridge_has_two_pins_and_a_line_that_rests_high_where_none_i
         ),
         (
             ICEBREAKER,
-            {"row_chains": 16, "column_read": "74hc165", "precharge_us": 0, "column_chains": 8},
-            "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
-        ),
-        (
-            ICEBREAKER,
             {"row_drive": "direct", "rows": 11, "columns": 11, "guard": True, "alive": True},
             "11 rows and 11 columns with guard lines take 12 + 12 wires, iCEBreaker has 22 free pins beside `contact` "
             "and `alive`; set row_drive",
         ),
-        (ULX3S, {"rows": 21, "columns": 21}, "21 rows and 21 columns take 21 + 21 wires, ULX3S 85F has 41 free pins"),
         (
             ULX3S,
             {"clock_hz": 12_000_000},

@@ -8,7 +8,7 @@ def chromium():
     """Headless Chromium without a network."""
     from playwright.sync_api import sync_playwright
 
-    from contactfpga_sim.lab.view import browser
+    from contactfpga_sim.lab import browser
 
     switches = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"]
     with sync_playwright() as playwright:

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("viser")
 pytest.importorskip("playwright")
 
-from contactfpga_sim.lab.view import browser
+from contactfpga_sim.lab import browser
 
 pytestmark = [
     pytest.mark.slow,  # a minute

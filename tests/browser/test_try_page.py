@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from contactfpga.design import kits
 from contactfpga.design.cover import cells_of, load_cover
-from contactfpga_sim.lab.view import browser
+from contactfpga_sim.lab import browser
 
 pytestmark = [
     pytest.mark.slow,  # 30 to 60 s
@@ -206,19 +206,6 @@ def test_two_fingers_touch_at_once_and_leave(visit):
     expect(page.locator("#headline")).to_have_text("Nothing touches it")
 
 
-def test_a_pen_says_how_hard_it_presses(visit):
-    page = visit()
-    lifted(page)
-    x, y = pixel(page, 32, 32)
-    pen = {"x": x, "y": y, "button": "left", "buttons": 1, "pointerType": "pen", "clickCount": 1}
-    session = page.context.new_cdp_session(page)
-    for force in (0.25, 0.75):
-        kind = "mousePressed" if force == 0.25 else "mouseMoved"
-        session.send("Input.dispatchMouseEvent", {**pen, "type": kind, "force": force})
-        expect(page.locator("#force-value")).to_have_text(f"{10 * force:.1f} N")
-        same(page, 1)
-
-
 def test_keys_put_move_resize_and_lift_a_finger(visit):
     page = visit()
     lifted(page)
@@ -286,21 +273,6 @@ def test_slow_motion_stops_at_rows_zones_and_bytes(visit):
     page.locator("#live").click()
     page.wait_for_selector(".caps .read")
     same(page, 1)
-
-
-def test_slow_motion_jumps_from_event_to_event_for_who_wants_no_motion(visit):
-    page = visit(reduced_motion="reduce")
-    stops = set(stopped_at(page))
-    page.locator("#play").click()
-    seen = set()
-    while len(seen) < 4:
-        seen.add(page.input_value("#cursor"))
-        page.wait_for_timeout(30)
-    assert seen <= stops
-    page.emulate_media(reduced_motion="no-preference")
-    expect(page.locator("#play")).to_have_text("Pause")
-    looks = (page.input_value("#cursor") for _ in range(PATIENCE_MS // 40) if not page.wait_for_timeout(40))
-    assert any(cursor not in stops for cursor in looks)
 
 
 def stopped_at(page):

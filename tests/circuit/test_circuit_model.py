@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contactfpga.design.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static, transient
-from contactfpga.design.circuit.network import OFF, Drive, Network, charge
+from contactfpga.design.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static
+from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels
 from contactfpga.design.circuit.values import THERMAL_V
 
@@ -40,34 +40,6 @@ def test_a_pressed_column_rests_where_the_diodes_current_meets_the_pulls():
     worst = static.scan(circuit.replace(row_pull_ohm=1e8), 1, 1)
     assert worst.level_v == pytest.approx(3.3 - amperes * 10_000, abs=1e-4)
     assert worst.pin_ma == pytest.approx(1e3 * amperes, rel=1e-4)
-
-
-def test_a_floating_column_is_pulled_by_its_neighbors_as_capacitances_divide():
-    circuit = Circuit(column_pull_ohm=1e8, neighbor_pf=12.0)
-    pressed = np.array([[True, False, True]])
-    network = Network(circuit, pressed)
-    done = phases.passed(phases.settle(network, LEVELS))
-    fallen = 3.3 - done.trace.volts[done.trace.volts[:, 1].argmin()]
-    expected = (12 * (fallen[0] + fallen[2]) + 2 * fallen[3]) / (30 + 2 * 12 + 2)
-    assert fallen[1] == pytest.approx(expected, rel=5e-3)
-    assert fallen[1] > 0.5
-
-
-def test_a_line_that_floats_holds_its_charge():
-    network = Network(Circuit(column_pull_ohm=1e8), ~CELL)
-    start = transient.at_rest(network, Drive.of(0.0, 3.3, network))
-    end = transient.run(network, Drive.of(OFF, 3.3, network), start, 1e-6).end
-    assert end.lines[0] - start.lines[0] == pytest.approx(3.3 / 1e8 * 1e-6 / (32 * PF), rel=0.01)  # the pull's
-
-
-def test_a_junctions_charge_is_the_integral_of_its_capacitance():
-    volts = np.linspace(-3, 0.5, 20_001)
-    for diode in (Circuit().diode, SILICON):
-        coulombs, farads = charge(diode, volts)
-        summed = np.concatenate([[0], np.cumsum((farads[1:] + farads[:-1]) / 2 * np.diff(volts))])
-        assert np.allclose(coulombs - coulombs[0], summed, atol=2e-17)
-        reverse = PF * diode.junction_pf * (1 + 2 / diode.junction_v) ** -diode.grading
-        assert np.interp(-2, volts, farads) == pytest.approx(reverse, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -27,32 +27,6 @@ def run(run):
     return functools.partial(run, "latency")
 
 
-@pytest.mark.campaign  # it has a board to compile
-def test_the_fast_example_reaches_its_figures(run):
-    """Figures of the issues for 16x16: a fingertip on an untouched sheet, also over USB as EHCI asks, a change while
-    frames are on the wire, and frames while it moves; the wire would take 70,588 per second."""
-    status, out, _ = run("--skin", FILE, "--touches", "12", "--exact", "--asks", "10", "--json")
-    assert status == 0
-    found = json.loads(out)
-    assert {"touch_to_last_byte_us", "touch_to_contact_us", "frames_per_s", "bytes"} <= set(found)
-    spreads = [value for key, value in found.items() if key.endswith("_us") and isinstance(value, dict)]
-    assert len(spreads) == 6
-    assert all(0 < spread["median"] <= spread["p99"] <= spread["worst"] for spread in spreads)
-    last, pin = found["touch_to_last_byte_us"], found["touch_to_contact_us"]
-    assert last["median"] <= 20
-    assert last["worst"] <= 21
-    assert pin["worst"] <= 0.25
-    decision = found["touch_to_decision_us"]
-    assert decision["median"] <= 150
-    assert decision["worst"] <= 260
-    assert 70_000 <= found["frames_per_s"] <= 12_000_000 / 10 / found["bytes"] + 1
-    assert found["bytes"] == 17
-    assert found["change_to_last_byte_us"]["worst"] <= 38
-    # The slots and the bits cannot take less; what is over them is at most a tenth.
-    bound = 1.0 + 3 * 0.75 + found["bytes"] * 10 / 12
-    assert bound < last["median"] <= 1.1 * bound + 0.1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("cells", ["1x1", "2x5", "16x16"])
 def test_the_figures_are_reported_in_words(run, cells):

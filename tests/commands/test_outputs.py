@@ -1,15 +1,12 @@
-"""Where results are written is looked at before the work; what was worked out is not lost."""
+"""Where results are written is looked at before the work."""
 
 import os
-import re
 
-import numpy as np
 import pytest
 from every_command import called, leaves, options
 
 from contactfpga.tools.console import outputs
 from contactfpga_sim.apps import pool
-from contactfpga_sim.lab.arm import pictures, sweep
 
 
 @pytest.fixture
@@ -31,7 +28,6 @@ INTO_A_FOLDER = [
     leaf for leaf in leaves() if "--output" in options(leaf) and options(leaf)["--output"].metavar == "DIR"
 ]
 COMMANDS = {leaf.prog: called(leaf) for leaf in INTO_A_FOLDER} | {
-    "arm, charts": ["study", "arm", "--charts"],
     "contactfpga build": ["build", "icebreaker"],
 }
 
@@ -67,41 +63,6 @@ def test_a_place_that_can_be_is_made_and_nothing_is_left_in_it(tmp_path):
     (tmp_path / "kept").write_text("as it was")
     outputs.file(tmp_path / "kept")
     assert (tmp_path / "kept").read_text() == "as it was"
-
-
-def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, run):
-    def refused(*_):
-        raise OSError(28, "No space left on device")
-
-    point = sweep.SweepPoint(1.0, 1.0, 1.0, 1.0, 1.0)
-    monkeypatch.setattr(pictures, "draw", refused)
-    monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
-    status, out, errors = run("study", "arm", "--charts", "--jobs", "1", "--output", tmp_path)
-    assert status == 1
-    assert "No space left" in errors
-    assert str(tmp_path / "arm-charts.csv") in out
-    assert len((tmp_path / "arm-charts.csv").read_text().splitlines()) > 100
-
-
-@pytest.mark.slow
-def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, run):
-    from contactfpga.tools.commands import replay
-    from contactfpga_sim.model.board import native
-
-    now = [0.0]
-    built = []
-
-    def build(model):
-        now[0] += 0 if built else 1000.0
-        built.append(model)
-        return right(model)
-
-    right = native.load
-    monkeypatch.setattr(native, "load", build)
-    monkeypatch.setattr(replay.time, "monotonic", lambda: now.__setitem__(0, now[0] + 1.0) or now[0])
-    np.save(tmp_path / "frames.npy", np.tile(np.eye(16, dtype=bool), (500, 1, 1)))
-    said = run("replay", tmp_path / "frames.npy")[1]
-    assert re.search("^speed .*500 frames per second", said, re.MULTILINE)
 
 
 def test_a_file_is_named_as_it_was_asked_for(tmp_path):

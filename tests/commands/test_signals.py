@@ -1,16 +1,13 @@
 """Ctrl-C and TERM: no traceback, no false reason, statuses 130 and 143, whatever other people's code makes of them."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
-from sample import sample
-from terminals import environment, listening
+from terminals import environment
 
 import contactfpga
 from contactfpga.tools import cli
@@ -18,17 +15,6 @@ from contactfpga.tools.console import interrupt
 from contactfpga.tools.console.signals import SIGNALS
 
 STATUSES = {signal.SIGINT: 130, signal.SIGTERM: 143}
-CUT_SHORT = {
-    "settle": ["settle"],
-    "cover": ["cover", "design", "--help"],
-    "latency": ["latency", "--touches", "40"],
-    "chart": ["study", "chart", "--placements", "200", "--no-size", "--output", "out"],
-    "plot": ["plot", "nothing.mcap"],
-    "doctor": ["doctor", "--list"],
-}
-"""Commands that a signal cuts short, or that end by themselves, also with an error, before one comes."""
-RUNNING = {"zones": ["zones", "sim://", "--json"], "zones as a table": ["zones", "sim://"]}
-"""Those whose usual end it is, once they run."""
 
 
 def done(*words, path=""):
@@ -73,39 +59,6 @@ def test_a_signal_while_a_library_of_c_plus_plus_loads(library, number, tmp_path
     (tmp_path / "sitecustomize.py").write_text(FINDS.replace("LIBRARY", library).replace("DO", end))
     found = done("-m", "contactfpga", "plot", "nothing.mcap", path=tmp_path)
     assert (found.returncode, found.stderr) == (STATUSES[number], "")
-
-
-def caught(process):
-    """The numbers of the signals that a process handles."""
-    with open(f"/proc/{process.pid}/status") as file:
-        mask = next(int(line.split()[1], 16) for line in file if line.startswith("SigCgt"))
-    return {number for number in range(1, 32) if mask >> number - 1 & 1}
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="this system has no /proc")
-@pytest.mark.parametrize("name", [*CUT_SHORT, *RUNNING])
-@pytest.mark.parametrize("seed", sample(range(60), quick=range(1), slow=range(1, 4)))
-def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
-    rng = random.Random(f"{name} {seed}")
-    number = rng.choice(SIGNALS)
-    command = [sys.executable, "-m", "contactfpga", *(CUT_SHORT | RUNNING)[name]]
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "preexec_fn": listening, "cwd": tmp_path}
-    with subprocess.Popen(command, **options, text=True, env=environment()) as process:
-        until = time.monotonic() + 60
-        while process.poll() is None and signal.SIGTERM not in caught(process):
-            assert time.monotonic() < until
-            time.sleep(0.0005)
-        time.sleep(rng.choice([0.0, 0.1, 0.5, 1.5]) * rng.random())
-        ended = process.poll() is not None
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=100)
-    if ended:
-        return
-    for word in ("Traceback", "KeyboardInterrupt", "Exception ignored", "Warning", "Error", "numpy", "failed"):
-        assert word not in errors, errors
-    at_their_end = {0, 1, 2} if name in ("doctor", "plot", "cover") else {0}  # it may end just before the signal
-    at_their_end |= {-number}  # Python takes its handlers away before it ends; a shell shows the same status
-    assert process.returncode in {STATUSES[number]} | at_their_end, errors
 
 
 # ---- what becomes of a signal
@@ -155,23 +108,6 @@ def test_a_signal_that_others_make_something_of(how, number, tmp_path):
     (tmp_path / "started.py").write_text(STARTS.replace("BODY", BODIES[how]).replace("NUMBER", str(int(number))))
     found = done("-m", "started", path=tmp_path)
     assert (found.returncode, found.stderr) == (0 if "usual end" in how else STATUSES[number], "")
-
-
-@pytest.mark.parametrize("number", SIGNALS)
-def test_a_signal_that_numpy_drops_comes_again(number):
-    """While it looks whether a type is one of ctypes: else a command that runs until a signal would never end."""
-
-    class Kind(type):
-        @property
-        def __mro__(cls):
-            signal.raise_signal(number)
-
-    def body():
-        assert np.dtype(Kind("Any", (), {})) == object, "the signal is dropped"
-        time.sleep(60)
-        pytest.fail("it goes on")
-
-    assert interrupt.guarded(body) == 128 + number
 
 
 def test_a_signal_is_not_repeated_while_the_command_cleans_up():

@@ -1,15 +1,11 @@
 """`doctor --watch` and `wire --bounce` on the compiled gateware, through the driver."""
 
 import json
-import signal
-import sys
-import time
 import tomllib
 
 import numpy as np
 import pytest
 from fake_board import FakeBoard, patiently
-from terminals import OnTerminal
 
 from contactfpga import Skin
 
@@ -85,26 +81,6 @@ def test_a_sheet_that_nobody_touches_is_a_fault_and_a_sound_one_is_not(watched):
     status, out = watched(np.zeros((1, 4, 4), bool))
     assert status == 1
     assert "fault no switch read pressed; was the sheet touched?" in out
-
-
-@pytest.mark.slow
-def test_ctrl_c_ends_a_watch_with_what_it_found(simulated):
-    cells = touched(0.25)
-    cells[:, 3, 1] = True
-    arguments = [*map(str, simulated(cells))]
-    command = [sys.executable, "-m", "contactfpga", "doctor", "--watch", "--stuck-s", "0.1", *arguments]
-    terminal = OnTerminal(command, 100, 40)
-    try:
-        while "! stuck" not in terminal.said:
-            assert terminal.process.poll() is None, terminal.said[-1000:]
-            time.sleep(0.05)
-        assert "pressed before" in terminal.said
-        terminal.process.send_signal(signal.SIGINT)
-        assert terminal.wait() == 1
-        assert "Traceback" not in terminal.said
-        assert terminal.said.rstrip().endswith("mask = [[3, 1]]")
-    finally:
-        terminal.process.kill()
 
 
 @pytest.mark.parametrize(

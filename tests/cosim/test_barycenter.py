@@ -21,9 +21,8 @@ from contactfpga_sim.model.board import replay
 from contactfpga_sim.model.golden import Timeline, predict, zones
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.scenes.shapes import variants
-from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
-from contactfpga_sim.verify.cosim.covering import stimulus
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
@@ -56,15 +55,6 @@ def test_random_frames_and_shapes_that_break_labellers_have_scipys_barycenters_r
     frames = rng.random((1500, 16, 16)) < rng.uniform(0, 1, (1500, 1, 1))
     frames = np.concatenate([frames, [cells for _, cells in variants(16, 16)]])
     assert_replayed(frames, 4, most=64)
-    record_property("cases", len(frames))
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(("shape", "bits", "connectivity"), [((4, 5), 8, 4), ((1, 1), 0, 8), ((32, 33), 1, 8)])
-def test_random_frames_of_other_sheets_have_scipys_barycenters_rounded(record_property, shape, bits, connectivity):
-    rng = np.random.default_rng(8)
-    frames = rng.random((1500, *shape)) < rng.uniform(0, 1, (1500, 1, 1))
-    assert_replayed(frames, bits, connectivity)
     record_property("cases", len(frames))
 
 
@@ -111,15 +101,6 @@ def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
     for zone, (y, x) in zip(zones, exact, strict=True):
         assert abs(zone.x_mm - x * 3.4) <= zones.rounding_mm[0] + 1e-9
         assert abs(zone.y_mm - y * 5.0) <= zones.rounding_mm[1] + 1e-9
-
-
-@pytest.mark.slow  # it compiles a board; test_cosim.py has boards that divide in Amaranth's simulator
-def test_the_compiled_board_is_the_golden_models_in_every_clock():
-    cycles = 40 * SHEET.rows * SHEET.derived.row_clocks
-    timeline = stimulus(SHEET, cycles, seed=6)
-    expected = predict(SHEET, timeline, cycles)
-    assert len(expected.items) > 100
-    assert compare(expected, bench_native.run(SHEET, timeline, cycles)) > 1_000
 
 
 CROWDED = [(4, 12, 4, 8), (9, 8, 8, 5), (2, 16, 8, 0)]

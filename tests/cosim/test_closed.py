@@ -1,13 +1,10 @@
 """Boards of closed sheets: in lockstep with the golden model, from the pins to what a program reads."""
 
-import json
-
 import numpy as np
 import pytest
 from sample import sample
 
 from contactfpga import Batch, Skin
-from contactfpga.tools import cli
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, unseal
 from contactfpga.wire.table import decode
@@ -15,10 +12,10 @@ from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.model.board import replay
-from contactfpga_sim.model.golden import Timeline, boundaries, predict
+from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.zones import closed_flood
-from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim import bench_amaranth
 from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.covering import CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
 
@@ -41,17 +38,6 @@ def test_covering_set_in_amaranths_simulator(scan, number):
     timeline = stimulus(skin, cycles, seed=number)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
-
-
-@pytest.mark.campaign  # compiles a board each
-@pytest.mark.parametrize(("scan", "number"), EVERY[::2])
-def test_covering_set_in_compiled_boards(scan, number, record_property):
-    skin = skin_for(COVERING[scan][number])
-    cycles = 200_000
-    timeline = stimulus(skin, cycles, seed=number)
-    expected = predict(skin, timeline, cycles)
-    assert all(expected.events(boundary) for boundary in boundaries(skin))
-    record_property("cases", compare(expected, bench_native.run(skin, timeline, cycles)))
 
 
 def frames_of(skin, trace):
@@ -122,16 +108,3 @@ def check_arrays(skin, found):
 def test_replay_takes_the_circumference_of_its_pitch():
     skin = replay.skin_for(4, 6, 8, zones=3, pitch_mm=5.0, closed=True)
     assert (skin.closed, skin.pitch_x_mm, skin.pitch_y_mm) == (True, pytest.approx(5.0), 5.0)
-
-
-@pytest.mark.campaign  # compiles a board
-def test_replay_wraps_recorded_frames_around_a_cylinder(tmp_path, capsys):
-    frames = np.zeros((3, 4, 4), bool)
-    frames[0, 1, [3, 0]] = frames[1, 2] = frames[2, 3, 1] = True
-    np.save(tmp_path / "frames.npy", frames)
-    assert cli.main(["replay", str(tmp_path / "frames.npy"), "--closed", "--json"]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    ((seam,), (ring,), (cell,)) = (line["zones"] for line in lines)
-    assert (seam["area_cells"], seam["x_mm"], seam["y_mm"], seam["winding"]) == (2, pytest.approx(35.0), 10.0, "")
-    assert (ring["area_cells"], ring["x_mm"], ring["point_mm"], ring["winding"]) == (4, None, None, "ring")
-    assert (cell["x_mm"], cell["winding"]) == (pytest.approx(10.0), "")

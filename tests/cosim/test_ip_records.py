@@ -8,14 +8,12 @@ import sys
 
 import numpy as np
 import pytest
-from amaranth.sim import Simulator
 from sample import sample
 
 from contactfpga.driver.conversation import Conversation, frames_in
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga_hdl.core import Core
-from contactfpga_hdl.link.records import Records
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.golden.frame import Packer
 from contactfpga_sim.model.golden.trace import Timeline
@@ -260,42 +258,3 @@ def test_both_streams_tell_of_the_same_zones_and_a_request_is_answered():
     assert sum(len(frame.moments) for frame in sent) > 10
     for frame in sent:
         assert frames[frame.time_us] == frame.moments.tolist()
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_records_that_come_at_any_time_go_out_as_frames(seed):
-    """The buffer by itself, far busier than the packer keeps it: frames of up to six records, of which a half is
-    sent. Restarts cut some of them."""
-    skin, clocks = SKINS["on change"], 4000
-    rng, takes = random.Random(seed), stalling(seed)
-    dut, noted, taken, got = Records(skin), {}, [], []
-
-    async def bench(ctx):
-        left = 0
-        for clock in range(clocks):
-            comes, sent, item = rng.random() < 0.3, rng.random() < 0.5, rng.randrange(1 << 16)
-            restarts = not comes and rng.random() < 0.02
-            if restarts:
-                noted[clock], left = PackedItem(None), 0
-            if comes:
-                closing = {"time": rng.randrange(1 << 24), "zones": rng.randrange(8), "cells": rng.randrange(21)}
-                noted[clock] = PackedItem(item) if left else PackedItem(None, closing, sent)
-                ctx.set(dut.tag.time, closing["time"])
-                ctx.set(dut.summary, {"zones": closing["zones"], "cells": closing["cells"]})
-            ctx.set(dut.restart, restarts)
-            ctx.set(dut.taken, comes)
-            ctx.set(dut.send, sent)
-            ctx.set(dut.item, {"data": item, "end": not left})
-            left = left if not comes else left - 1 if left else rng.randrange(7)
-            taken.append(takes(clock))
-            ctx.set(dut.words.ready, taken[-1])
-            _, _, valid, word = await ctx.tick().sample(dut.words.valid, dut.words.payload)
-            got.append((word.data, bool(word.last)) if valid else None)
-
-    simulator = Simulator(dut)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    right = offered(skin, noted, taken)
-    assert got == right, next(clock for clock in range(clocks) if got[clock] != right[clock])
-    assert len({*numbers(skin, [one for one in got if one])}) > 30

@@ -10,7 +10,6 @@ import sys
 import pytest
 from fake_board import FakeBoard
 from terminals import environment
-from two_links import write_robot
 
 from contactfpga import Skin
 
@@ -170,55 +169,3 @@ print(board.stats.bytes)
     status, count = run(program, board.path, file).splitlines()
     assert status == "[0, 0]"
     assert file.stat().st_size == int(count)
-
-
-@pytest.mark.slow
-def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
-    pytest.importorskip("mcap", reason="the extra `record` is not installed")
-    program = """
-from contactfpga.recordings import Recording
-from contactfpga.recordings import Session
-session = Session(sys.argv[2])
-session.add(port, timeout=60)
-session.start()
-print({child(session.stop) for _ in range(4)}, session.running)
-session.stop()
-Recording(sys.argv[2])
-"""
-    board.stream = board.frame
-    board.hello_s = 0.05
-    assert run(program, board.path, tmp_path / "session.mcap") == "{0} True\n"
-
-
-@pytest.mark.slow
-def test_sheets_of_one_port_in_a_child():
-    program = """
-from contactfpga.driver import sheets
-board = contactfpga.open("sim://?sheets=examples/two-sheets.toml#0")
-print(child(lambda: (refused(board.read), board.close())), len(sheets._open))
-board.read()
-"""
-    assert run(program, "") == "0 1\n"
-
-
-@pytest.mark.slow
-def test_a_body_in_a_child_is_closed(tmp_path):
-    program = """
-from two_links import PluggedPorts
-from contactfpga.robot.body import Body
-from contactfpga.robot.body import OpenBody
-body = OpenBody(Body.load(port), opened=PluggedPorts().opened)
-snapshots = body.subscribe()
-body.read(60)
-
-def work():
-    for call in (body.read, body.latest, body.next, body.subscribe, snapshots.next):
-        refused(call)
-    snapshots.close()
-    body.close()
-
-print({child(work) for _ in range(6)})
-body.next(60)
-body.close()
-"""
-    assert run(program, write_robot(tmp_path)) == "{0}\n"

@@ -1,7 +1,6 @@
 """The thread in C that reads ports: it gives everything back, waits for no Python thread, and says what a thread in
 Python says."""
 
-import contextlib
 import ctypes
 import gc
 import itertools
@@ -10,11 +9,9 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-import tty
 
 import pytest
-from fake_board import background, wait_until
+from fake_board import background
 
 import contactfpga
 import hatch_build
@@ -97,18 +94,6 @@ def test_without_the_library_a_thread_in_python_reads(board, monkeypatch, tmp_pa
         opened(board)
 
 
-@pytest.mark.slow
-def test_losses_and_restarts_are_logged(board, caplog):
-    caplog.set_level("INFO", "contactfpga")
-    with opened(board):
-        board.power_up()
-        board.send(board.hello())
-        wait_until(lambda: len(caplog.records) > 1)  # though nobody calls
-    assert [record.getMessage() for record in caplog.records if "Skin" not in record.getMessage()] == [
-        f"{board.path}: the board was restarted"
-    ]
-
-
 SENDER = """
 import os, sys, time
 data = bytes.fromhex(sys.argv[2])
@@ -138,39 +123,6 @@ def test_frames_come_while_no_python_thread_runs(board):
         sender.wait(LONG)
         assert newest.time_us == first.time_us + count * 96
         assert host.stats.lost == 0
-
-
-def test_packets_that_only_python_decodes_wait_in_the_system_as_without_c():
-    """Undecoded packets stay with the operating system, so that a board that sends more than Python decodes fills no
-    ring with frames that grow old."""
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    packets = 20 * (99 * b"\x55" + b"\0")
-
-    def fill(least):
-        """Number of bytes that the port takes, at least ``least``, until it takes none for a while."""
-        total, begun = 0, time.monotonic()
-        until = begun + 1.0
-        while time.monotonic() < until or (total < least and time.monotonic() < begun + LONG):
-            with contextlib.suppress(BlockingIOError):
-                total += os.write(master, packets)
-                until = time.monotonic() + 1.0
-            assert total < 1_000_000, "nothing holds it back"
-            time.sleep(1e-4)
-        return total
-
-    port = native.Port(slave, time.monotonic())
-    try:
-        held = fill(native.CHUNK // 2 + 1)
-        assert native.CHUNK < 2 * held < 6 * native.CHUNK
-        reads, _, missing = port.take()
-        assert (missing, len(reads.data_of(0, len(reads))) > 4000) == (0, True)
-        assert fill(4001) > 4000
-    finally:
-        port.close()
-        os.close(master)
-        os.close(slave)
 
 
 def test_the_newest_frame_does_not_wait_for_a_thread_that_works_through_frames(board):

@@ -189,22 +189,6 @@ def test_a_port_that_read_zones_keeps_open_goes_to_who_opens_it(board, monkeypat
         assert len(contactfpga.read_zones(port, LONG)) == 1
 
 
-@pytest.mark.parametrize("level", [None, "DEBUG"])
-def test_the_library_of_ports_logs_its_reads_only_where_it_is_asked_to(board, python, level):
-    """A program that logs everything would get a line for each read of the port."""
-    asked = "" if level is None else f"logging.getLogger('serialx').setLevel('{level}')"
-    code = f"""
-import logging, contactfpga
-logging.basicConfig(level="DEBUG")
-{asked}
-with contactfpga.open("{board.path}", timeout={LONG}) as opened:
-    opened.read({LONG})
-"""
-    lines = python(code).stderr.splitlines()
-    assert any("contactfpga" in line and "the board has a 16x16 Skin" in line for line in lines)
-    assert any("serialx" in line for line in lines) == (level is not None)
-
-
 def test_more_ports_are_searched_where_they_are_named(monkeypatch, board):
     monkeypatch.setenv(finding.MORE, os.pathsep.join([board.path, board.path]))
     named = [one for one in finding.candidates() if one.device == board.path]

@@ -1,9 +1,6 @@
 """Several sheets at one port: each is a board of its own to whoever opens it."""
 
-import os
-import select
 import threading
-import tty
 
 import pytest
 from model_board import DirectPort
@@ -14,7 +11,6 @@ from contactfpga.driver import finding, sheets
 from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
 from contactfpga.driver.finding import Candidate
-from contactfpga.tools.cli import main
 from contactfpga.wire.sheet_number import numbered, sheet_of, unnumbered
 
 SKINS = (Skin(name="chest", row_drive="74hc595", column_read="74hc165"), Skin(name="back", rows=9, columns=7))
@@ -171,39 +167,6 @@ def test_a_lost_port_is_lost_for_all_and_opened_anew_after(line):
         with opened(other, 1) as again:
             assert again.read()[0].sum_x == 11
         assert other.closed == 1
-
-
-def test_sheets_at_a_serial_port(capsys):
-    """Through the operating system; the doctor looks at the port itself."""
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    line, ends = Line(), threading.Event()
-
-    def answer():
-        while not ends.is_set():
-            if select.select([master], [], [], 0.01)[0]:
-                line.write(os.read(master, 4096))
-            while data := line.read(0.0):
-                os.write(master, data)
-
-    thread = threading.Thread(target=answer)
-    thread.start()
-    try:
-        port = os.ttyname(slave)
-        with contactfpga.open(f"{port}#0", timeout=60) as chest, contactfpga.open(f"{port}#1", timeout=60) as back:
-            for number, board in enumerate((chest, back)):
-                assert (board.port, board.name) == (f"{port}#{number}", SKINS[number].name)
-                assert board.hello.place == (number, 2)
-                assert board.read(60.0)[0].sum_x == 10 + number
-                assert (board.stats.lost, board.stats.damaged.total()) == (0, 0)
-        main(["doctor", f"{port}#1", "--timeout", "1", "--seconds", "0.1"])
-        assert f"ok    {port} may be read and written" in capsys.readouterr().out
-    finally:
-        ends.set()
-        thread.join()
-        os.close(master)
-        os.close(slave)
-    assert sheets._open == {}
 
 
 def test_numbers_of_sheets_end_a_port():

@@ -1,4 +1,4 @@
-"""Frames of sheets of every size, full to the last zone, through the whole driver."""
+"""Frames of sheets of many sizes, full to the last zone, through the whole driver."""
 
 import itertools
 import random
@@ -48,16 +48,6 @@ def test_full_frames_of_some_sheets_arrive(connectivity, report):
     rng = random.Random(f"{connectivity} {report}")
     for rows, columns in [(1, 1), (64, 64), (32, 32), (64, 1), (1, 64), *rng.sample(SIZES, 12)]:
         check(rows, columns, connectivity, report)
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(24 * 3600)
-@pytest.mark.parametrize("connectivity", [4, 8])
-@pytest.mark.parametrize("report", REPORTS)
-def test_full_frames_of_all_sheets_arrive(connectivity, report, record_property):
-    for rows, columns in SIZES:
-        check(rows, columns, connectivity, report)
-    record_property("cases", len(SIZES))
 
 
 def test_no_frame_is_too_long_for_the_reader(monkeypatch):

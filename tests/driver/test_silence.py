@@ -1,13 +1,11 @@
 """No data: silence is an error or an event, and never an empty sheet."""
 
-import asyncio
 import contextlib
 
 import pytest
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga.driver import health
 from contactfpga.driver.events import longest_pause_s
 from contactfpga.tools.console import live
 from contactfpga.wire.faults import Faults
@@ -115,24 +113,6 @@ def test_a_pulled_plug_is_no_silence(board, port):
     for one in (frames, events):
         with pytest.raises(contactfpga.PortLost, match="plug it in"):
             one.next()
-
-
-def test_async_iteration_sees_silence_too(board, port):
-    async def first_silence():
-        port.dead = True
-        async for event in board.events(deadline_s=0.05):
-            if isinstance(event, contactfpga.Silence):
-                return event
-        return None
-
-    assert asyncio.run(first_silence()).seconds == pytest.approx(0.05, abs=0.02)
-
-    async def first_error():
-        async for _ in board.subscribe(deadline_s=0.05):
-            pass
-
-    with pytest.raises(contactfpga.NoData):
-        asyncio.run(first_error())
 
 
 def test_the_latest_frame_may_not_be_older_than_asked_for(board, port):
@@ -251,16 +231,3 @@ def test_a_display_shows_silence_in_the_place_of_a_table_that_stands_still(board
     with pytest.raises(contactfpga.ReadTimeout):
         list(shown)
     assert board.silence.seconds >= 1.0
-
-
-def test_doctor_names_lines_and_the_age_of_the_last_frame(board, port):
-    port.word = 1 << 3 | 1 << 34
-    port.out += port.report() + port.frame(flags=["fault"])
-    zones = next(zones for zones in board if zones.faults)
-    port.dead = True
-    port.seconds += 0.5
-    found = [(one.verdict, one.sentence) for one in health.lines(board, zones)]
-    assert found[0][0] == "ok"
-    assert found[0][1].endswith(" ms ago")
-    assert [one[1].split(":")[0] for one in found[1:]] == ["column 2 stuck", "row 3 open"]
-    assert {one[0] for one in found[1:]} == {"fault"}

@@ -157,49 +157,6 @@ def test_one_wrong_record_is_flagged_in_its_frame_and_in_no_other(bench, rng):
     assert not any(flags[1::2])
 
 
-@pytest.mark.parametrize("capacity", [1, 3, 8, 10])
-def test_zones_beyond_the_capacity_are_counted_and_flagged_but_not_carried(bench, rng, capacity):
-    sheet = (4, 5)
-    frames = [[0b10101] * rows + [0] * (4 - rows) for rows in (3, 1, 4, 0, 2)] + [[1, 0, 0, 0]]
-    plan = schedule(rng, frames, zones := [zones_of(frame) for frame in frames], sheet)
-    dut = Audit(skin_of(*sheet, connectivity=4, zone_capacity=capacity))
-    end = dut.items.payload.shape()["end"].offset
-    items, _, summaries = run(bench, dut, plan, sheet, rng)
-    carried, frame = [[] for _ in frames], 0
-    for _, item in items.transfers:
-        if item >> end:
-            frame += 1
-        else:
-            carried[frame].append(item)
-    for group, summary, got in zip(zones, summaries, carried, strict=True):
-        assert got == [record_word(zone, *sheet) for zone in group[:capacity]]
-        count, over = len(group), int(len(group) > capacity)
-        assert (summary["zones"], summary["overflow"], summary["mismatch"]) == (count, over, 0)
-
-
-def test_what_passes_waits_for_its_place_and_what_is_beyond_the_capacity_does_not(bench, rng):
-    sheet = (4, 5)
-    frames = [[0b10101] * 4 for _ in range(4)]
-    zones = [zones_of(frame) for frame in frames]
-    plan = schedule(rng, frames, zones, sheet)
-    ready = [rng.random() < 0.6 for _ in range(4000)]
-    dut = Audit(skin_of(*sheet, connectivity=4, zone_capacity=10))
-    items, source, summaries = run(bench, dut, plan, sheet, rng, ready=lambda cycle: ready[cycle])
-    end = dut.items.payload.shape()["end"].offset
-    passed = [cycle for cycle, _ in items.transfers]
-    taken = [[]]
-    for cycle, (_, zone) in zip(source.transfers, plan.records):
-        taken[-1].append(cycle)
-        if zone is None:
-            taken.append([])
-    assert passed == [cycle for cycles in taken[:-1] for cycle in [*cycles[:10], cycles[-1]]]
-    assert all(ready[cycle] for cycle in passed)
-    assert any(not ready[cycle] for cycles in taken[:-1] for cycle in cycles[10:-1])
-    assert {len(cycles) - 1 for cycles in taken[:-1]} == {summary["zones"] for summary in summaries} == {12}
-    assert sum(item >> end for _, item in items.transfers) == 4
-    assert {(summary["overflow"], summary["mismatch"]) for summary in summaries} == {(1, 0)}
-
-
 def changing_frames(rng, rows, columns, count):
     frames = [[0] * rows]
     for _ in range(count):

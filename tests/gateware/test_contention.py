@@ -1,14 +1,10 @@
-"""Lines that are driven against each other are reported, by each sheet that the gateware is simulated with."""
-
-import dataclasses
+"""Lines that are driven against each other are reported by the sheet that the gateware is simulated with."""
 
 import numpy as np
 import pytest
 from reversal import FAST, never_let_go, small
 
 from contactfpga.skin import Skin
-from contactfpga_sim.model.board import native
-from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.sheet.matrix import Contention, Matrix
 from contactfpga_sim.verify.cosim import bench_amaranth
@@ -37,18 +33,6 @@ def touch(skin: Skin) -> Timeline:
 def test_in_amaranths_simulator(wrong, skin):
     with pytest.raises(Contention, match=r"columns 0b1 are driven against rows 0b10"):
         bench_amaranth.run(skin, touch(skin), 400)
-
-
-@pytest.mark.campaign
-def test_on_the_compiled_board(wrong):
-    skin = small(rows=2, columns=2)
-    model = dataclasses.replace(model_of(skin), key=f"never lets go: {native.skin_key(skin)}")
-    (_, cells, _), *_ = touch(skin).pieces
-    with CompiledBoard(skin, model=model) as board:
-        board.run(100)
-        board.press(cells)
-        with pytest.raises(Contention, match=r"in \d+ clocks a column was driven against a row"):
-            board.run(200)
 
 
 # ---- the sheet's levels

@@ -99,17 +99,6 @@ def test_every_switch_follows_the_rule_whatever_the_others_do(bench, rng, method
             assert [frame[r] >> c & 1 for frame in got] == states, f"switch {r}, {c} at {press}, {release}"
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("sheet", [*SHEETS, (1, 64)])
-def test_a_row_comes_out_as_many_clocks_later_as_it_has_columns_and_three(bench, rng, method, sheet):
-    rows, columns = sheet
-    frames = [[rng.randrange(1 << columns) for _ in range(rows)] for _ in range(max(3, 12 // rows))]
-    _, source, sink = frames_through(bench, (*sheet, method, 1, 1), frames)
-    assert [cycle for cycle, _ in sink.transfers] == [cycle + columns + 3 for cycle in source.transfers]
-    gaps = {late - early for early, late in itertools.pairwise(source.transfers)}
-    assert max(gaps) <= max(10, columns + 6), "each row is done before the Skin lets the next one come"
-
-
 UNEVEN = Skin(rows=3, columns=4, clock_hz=12_000_000, report="cells", scan="reversal", precharge_us=1.0, settle_us=2.0)
 
 

@@ -5,44 +5,15 @@ import math
 from fractions import Fraction
 
 import pytest
-from amaranth.hdl import Cat, Module, Signal
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
 from sample import sample
 from zone_oracles import nearest
 
 from contactfpga import Skin
-from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
 
 
 def skin_of(rows, columns, bits, **options):
     return Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=bits, settle_us=300, **options)
-
-
-class Waiting(wiring.Component):
-    """The divider with its backlog, as the top joins them. A record is not taken while the backlog is
-    full, as no frame has more than it holds."""
-
-    def __init__(self, skin):
-        self.room, self.backlog, self.divider = skin.derived.backlog, Backlog(skin), Divider(skin)
-        passed, items = self.backlog.passed.signature.flip(), self.divider.items.signature
-        super().__init__({"records": In(passed), "items": Out(items)})
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules += [self.backlog, self.divider]
-        passed, waiting = self.backlog.passed, self.backlog.waiting
-        wait = Signal(range(self.room + 1))
-        m.d.sync += wait.eq(wait + (passed.valid & passed.ready) - (waiting.valid & waiting.ready))
-        m.d.comb += [
-            passed.payload.eq(self.records.payload),
-            passed.valid.eq(self.records.valid & (wait != self.room)),
-            self.records.ready.eq(passed.ready & (wait != self.room)),
-        ]
-        wiring.connect(m, waiting, self.divider.records)
-        wiring.connect(m, self.divider.items, wiring.flipped(self.items))
-        return m
 
 
 class Oracle:
@@ -176,65 +147,6 @@ def test_zones_at_the_edge_of_rounding_on_large_sheets(bench, rng, size, bits):
     assert len(zones) > 50
     _, wanted, _, taker = run(bench, rng, oracle, sorted(zones))
     check_items(wanted, taker)
-
-
-@pytest.mark.parametrize(("gap", "stall"), [(0.0, 0.9), (0.9, 0.0), (0.8, 0.8), (0.3, 0.3)])
-@pytest.mark.parametrize("stage", [Divider, Waiting])
-def test_nothing_is_lost_or_changed_by_gaps_and_stalls(bench, rng, stage, gap, stall):
-    oracle = Oracle(4, 5, 2)
-    zones = rng.sample(oracle.every_zone(), 60)
-    _, wanted, _, taker = run(bench, rng, oracle, zones, stage(skin_of(4, 5, 2)), gap, stall=stall)
-    check_items(wanted, taker)
-
-
-def cycles_by_the_rule(oracle, words, put, size):
-    """Cycles in which items are taken by a packer that takes ``size`` clocks for each, and from which each was offered,
-    by the rule."""
-    taken, offered, free, gone, packer = [], [], 0, 0, 0
-    for word, at in zip(words, put, strict=True):
-        if word == oracle.end:
-            cycle = max(at + 2, free, packer)
-            offered.append(max(at + 2, free, gone + 1))
-            free = packer = cycle + 1
-        else:
-            last_bit = max(max(at + 2, free) + oracle.clocks, gone)
-            free = last_bit + 1
-            offered.append(free)
-            cycle = max(free, packer) + size - 1
-            packer = cycle + 1
-        gone = cycle
-        taken.append(cycle)
-    return offered, taken
-
-
-@pytest.mark.parametrize("size", [1, 3, 20])
-@pytest.mark.parametrize("gap", [0.0, 0.95])
-def test_a_queue_and_a_division_take_their_clocks_before_a_packer_of_any_speed(bench, rng, size, gap):
-    oracle = Oracle(4, 5, 2)
-    zones = rng.sample(oracle.every_zone(), 40)
-    words = [oracle.end if zone is None else oracle.record(*zone) for zone in spread(zones)]
-    dut = Waiting(skin_of(4, 5, 2, zone_capacity=6))
-    sim = bench(dut)
-    source = sim.source(dut.records, words, rng, gap=gap)
-    waited = 0
-
-    def reads(_cycle, seen):
-        """Takes items as the packer does: an item with its last byte, an end mark at once."""
-        nonlocal waited
-        valid, end = seen & 1, seen >> 1
-        takes = valid and (end or waited == size - 1)
-        waited = 0 if takes or not valid else waited + 1
-        return int(takes)
-
-    valid, ready = dut.items.valid, dut.items.ready
-    sim.drive(ready, reads, seen=Cat(valid, dut.items.payload.end))
-    shown, takes = sim.watch(valid), sim.watch(ready)
-    sim.run(100 * len(words), until=lambda: sum(takes.values) == len(words))
-    offered, taken = cycles_by_the_rule(oracle, words, source.transfers, size)
-    assert [cycle for cycle, one in enumerate(takes.values) if one] == taken
-    for begins, ends in zip(offered, taken):
-        assert not shown[begins - 1] or takes[begins - 1]
-        assert all(shown[begins : ends + 1])
 
 
 def test_an_area_of_0_which_only_a_faulty_labeller_lets_out_takes_the_same_clocks(bench):

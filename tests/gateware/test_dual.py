@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from amaranth.hdl import Cat, Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
@@ -25,56 +24,6 @@ def test_without_a_difference_each_clock_is_that_of_the_plain_gateware(changes):
     timeline = Timeline.frames(skin, list(rng.random((12, skin.rows, skin.columns)) < 0.4))
     cycles = 12 * skin.derived.frame_clocks + 1200
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles, limit_s=300)) > 100
-
-
-class Core(wiring.Component):
-    """Says what it is told, and how often it was reset."""
-
-    def __init__(self):
-        self.said = Signal(3, init=1)
-        self.clocks = Signal(12)
-        super().__init__({"tx": Out(1, init=1), "rows": Out(1), "contact": Out(1), "rx": In(1, init=1)})
-
-    def elaborate(self, platform):
-        m = Module()
-        m.d.comb += Cat(self.tx, self.rows, self.contact).eq(self.said)
-        m.d.sync += self.clocks.eq(self.clocks + 1)
-        return m
-
-
-@pytest.mark.parametrize("said", [0b000, 0b011, 0b101], ids=["line", "rows", "contact"])
-@pytest.mark.parametrize("fail_safe", [False, True])
-def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, fail_safe):
-    # At 3 Mbaud `scan - 2 * pause` and `scan + 2 * pause` are equal in the bits of the counter of the restart.
-    skin = SMALL.replace(fail_safe=fail_safe, baud=2_400_000)
-    first, second = Core(), Core()
-    dut = Dual(skin, first, second)
-    pause, scan = PAUSE_BITS * skin.derived.bit_clocks, skin.derived.frame_clocks
-    seen = []
-
-    async def bench(ctx):
-        for clock in range(10 + 2 * pause + scan + 20):
-            ctx.set(second.said, said if clock == 10 else 1)
-            _, _, tx, contact, *clocks = await ctx.tick().sample(dut.tx, dut.contact, first.clocks, second.clocks)
-            seen.append((tx, contact, *clocks))
-
-    simulator = Simulator(dut)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    line, contact, *clocks = zip(*seen)
-    low = [clock for clock, level in enumerate(line) if not level]
-    assert low == list(range(11, 12 + pause))
-    assert pause >= 10 * skin.derived.bit_clocks
-    high = [clock for clock, level in enumerate(contact) if level]
-    assert high == (list(range(11, 12 + 2 * pause + scan)) if fail_safe else [])
-    starts = [[clock for clock in range(1, len(seen)) if one[clock] < one[clock - 1]] for one in clocks]
-    assert [times[-1] for times in starts] == [12, 13]
-    assert clocks[0][:10] == tuple(range(10))
-    assert clocks[1][:10] == (0, *range(9))
-    begins = 12 + 2 * pause
-    assert [clock - 1 for clock in range(len(seen)) if clocks[0][clock] == 1 and clock > 12] == [begins]
-    assert clocks[0][begins:-1] == clocks[1][begins + 1 :]
 
 
 class Copy(Top):

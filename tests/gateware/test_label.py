@@ -88,17 +88,6 @@ def test_noise_and_mazes_come_out_in_their_cycles(bench, size, connectivity, lab
 
 
 @RULE
-@pytest.mark.parametrize(("gap", "stall"), [(0.4, 0.8), (0.8, 0.4)])
-@pytest.mark.parametrize("size", [(6, 9), (1, 7), (7, 3)])
-def test_stalls_on_either_port_change_no_zone(bench, rng, size, gap, stall, connectivity, labeller, closed):
-    rule, some = (connectivity, labeller, closed), np.random.default_rng(5)
-    frames = np.concatenate([make(some, *size, 6) for make in (noise, mazes)])
-    _, straight = label(bench, frames, rule)
-    _, stalled = label(bench, frames, rule, rng, gap, stall)
-    assert [record for _, record in stalled] == [record for _, record in straight]
-
-
-@RULE
 def test_a_recording_comes_out_in_its_cycles(bench, connectivity, labeller, closed):
     check(bench, recorded("sdh13x6")[::40][:12], connectivity, labeller, closed)
 

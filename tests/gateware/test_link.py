@@ -4,7 +4,6 @@ import bisect
 import itertools
 import struct
 import zlib
-from unittest import mock
 
 import pytest
 from link_bench import (
@@ -208,27 +207,6 @@ def test_a_hello_goes_out_at_start_every_half_second_and_when_asked_for(link, rn
     for period in (1, 2):
         decided = decisions(skin, frames, None)[HELLO_EVERY * period - 1][0]
         assert any(0 < begun - decided <= 3 + 2 * 90 for begun in hellos), "after one frame at most"
-
-
-@pytest.mark.slow
-def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
-    """The carry into the odometer's digits, and its own carries: 2^14 frames are too many to simulate, so the counters
-    begin just before."""
-    dut = PackerAndLink(skin_of("cells"))
-    with mock.patch.object(link_module, "LIVE_DIGITS", 1), mock.patch.object(odometer, "LIVE_DIGITS", 1):
-        sim = bench(dut)
-        frames = [Frame([], dict.fromkeys(TAG | SUMMARY, 0), [40 * index + 1]) for index in range(300)]
-        asked = {40 * index + 20 for index in (2, 127, 128, 129, 255, 256, 257, 298)}
-        sink = run((dut, sim), dut.skin, frames, lambda cycle: True, asked)
-    packets, _ = packets_of(sink)
-    sent = reported = 0
-    for begun, packet in packets:
-        if packet[0] == 0:
-            assert packet == hello_sent(dut.skin, sink, begun, sent)
-            reported = max(reported, sent)
-        else:
-            sent += 1
-    assert reported > 128
 
 
 def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):

@@ -65,14 +65,6 @@ def test_requests_are_taken_at_any_phase_with_jitter_and_clock_error(listen, rng
         assert [(got, asks) for _, got, asks in found] == [(number, hello)]
 
 
-def test_bytes_may_come_with_any_gaps(listen, rng):
-    data = request(0x15A2D1, True, listen.bit)
-    levels = []
-    for byte in data:
-        levels += line([byte], listen.bit) + [1] * rng.choice([0, 0, 1, 2, 30])
-    assert [got[1:] for got in listen(levels)[0]] == [(0x15A2D1, True)]
-
-
 def test_any_bytes_are_read_as_the_golden_model_does(listen, rng):
     """Requests, parts of some, bytes as other boards take them, any pulses and any bytes: each clock's number."""
     total = 0
@@ -134,15 +126,6 @@ def test_no_single_wrong_pulse_makes_another_request(read):
     # Seven bits of the check bytes carry nothing; a mark more does no harm, nor one less after another packet's.
     assert len(taken) == 7 + 2 + 1
     assert count == 6 * len(SYMBOLS) - len(SYMBOLS)
-
-
-def test_a_request_in_the_other_form_is_none(listen, rng):
-    """Hosts that do not know the board send both, the pulses first; neither board takes the other's."""
-    for number in (1, 0x15A2D1, 0x1FFFFF):
-        both = request(number, True, listen.bit) + request(number, True)
-        assert [got[1:] for got in listen(line(both, listen.bit))[0]] == [(number, True)]
-        assert [one.number for one in heard([(0, both)], 4).requests] == [number]
-        assert heard([(0, both)], 4).numbers[-1][1] == number
 
 
 def test_commands_come_as_pulses_too(bench, rng):

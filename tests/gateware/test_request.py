@@ -12,21 +12,6 @@ from contactfpga_hdl.link.uart import Receiver
 from contactfpga_sim.model.golden.request import heard
 
 BIT = 3
-BYTE = 10 * BIT
-
-
-@pytest.fixture(scope="module")
-def listen(bench):
-    """Requests (number, hello) in some bytes that follow each other without a gap, each with the cycle after its first
-    byte's first at which it is taken; and the number in each cycle."""
-    dut = Listener(Receiver(BIT))
-    sim = bench(dut)
-
-    def listen(data):
-        found, numbers = dut.listen(sim, line(data, BIT))
-        return [(cycle - IDLE, number, hello) for cycle, number, hello in found], numbers
-
-    return listen
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +66,6 @@ def sealed(plain):
     return stuffed + check(stuffed) + b"\0"
 
 
-def moment(bytes_before):
-    """Cycle in which the last of this many bytes is received."""
-    return (bytes_before - 1) * BYTE + 2 + BIT // 2 + 9 * BIT
-
-
 @pytest.mark.parametrize("size", range(3, 9))
 @pytest.mark.parametrize("code", [1, 9])  # of a request, of a command
 def test_a_shorter_packet_with_a_check_that_leaves_nothing_is_not_taken(obey, code, size):
@@ -96,36 +76,6 @@ def test_a_shorter_packet_with_a_check_that_leaves_nothing_is_not_taken(obey, co
     shorter += (low & 0x7F | (middle & 0x7F) << 7 | (high & 3) << 14).to_bytes(2, "little")
     assert 0 not in shorter
     assert obey(b"\0" + sealed(plain(9)) + shorter + b"\0") == [(9, False, None)]
-
-
-def test_any_bytes_hold_the_requests_that_a_reader_of_whole_packets_finds(listen, rng):
-    """Random bytes hold the requests that a reader of whole packets finds, also before the first delimiter, and with
-    flags without a meaning."""
-    total = 0
-    for turn in range(6):
-        data = sealed(plain(9)) if turn % 2 else b"\0"
-        for _ in range(25):
-            asked = plain(rng.randrange(1 << 21))[:3] + bytes([0x50 | rng.randrange(16)])
-            part = rng.choice([sealed(asked), b"\0", rng.randbytes(3)])
-            if rng.random() < 0.3:
-                part = part[: rng.randrange(len(part) + 1)]
-            data += part
-        first, *packets = data.split(b"\0")[:-1]
-        wanted, place = [], len(first) + 1
-        for packet in packets:
-            place += len(packet) + 1
-            if len(packet) == 8 and packet[4] >> 4 == 5 and agrees(packet):
-                number = sum(digit % 128 << 7 * index for index, digit in enumerate(packet[1:4]))
-                wanted.append((moment(place), number, bool(packet[4] & 1)))
-        found, _ = listen(data)
-        assert found == wanted
-        total += len(found)
-    assert total > 15
-
-
-def agrees(packet):
-    """Whether the packet's check is the CRC of its bytes, in the bits that the CRC has."""
-    return all((a ^ b) & mask == 0 for a, b, mask in zip(check(packet[:5]), packet[5:], (0x7F, 0x7F, 3)))
 
 
 # ---- commands

@@ -170,17 +170,6 @@ def test_derived_clocks_are_those_of_the_rules():
             assert mine.bit == theirs.shift_clocks
 
 
-def test_a_slot_lasts_as_long_as_the_shift_where_that_is_longer(bench, rng):
-    short = skin_of(rows=(17, 1), settle_us=0.5, release_us=0.5)
-    assert times(short).slot == times(short).first == 37, "18 bits of two clocks, one for the latch among them, and one"
-    assert times(skin_of(rows=(17, 1), settle_us=3.0, release_us=0.5)).slot == 42, "nothing is added to a longer slot"
-    assert times(skin_of(rows=(17, 3), settle_us=1.0, release_us=0.5)).slot == 18, "three chains: seven bits"
-    cells = changing(rng, short, slots(short, 40))
-    got = run(bench, short, cells)
-    assert got.driven == expected_driven(short, len(cells))
-    assert got.rows == expected_rows(short, cells)
-
-
 # ---- what the chips see
 
 

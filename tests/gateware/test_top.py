@@ -52,11 +52,6 @@ def test_probes_are_ports_only_when_asked_for(name):
         assert boundary not in rtlil.convert(Top(skin))
 
 
-def test_the_same_skin_gives_the_same_netlist():
-    skin = Skin(rows=3, columns=5, settle_us=12.0, debounce="sym_defer_pk", send="on_change")
-    assert rtlil.convert(Top(skin)) == rtlil.convert(Top(skin))
-
-
 def plain(packet):
     """A packet without its check bytes and stuffing; its blocks are short."""
     packet = packet[:-3]

@@ -1,11 +1,11 @@
-"""The golden model's zones and labeller timing: third opinions, known shapes, and the rule worked by hand."""
+"""The golden model's zones and labeller timing: third opinions, known shapes, and the rule worked cell by cell."""
 
 import cv2
 import numpy as np
 import pytest
 import zone_oracles
 from label_rules import row_rule
-from zone_oracles import cells_of, every_frame, zones_by_scipy, zones_of_frames
+from zone_oracles import every_frame, zones_by_scipy, zones_of_frames
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_sim.model import golden
@@ -100,56 +100,6 @@ def test_frames_beyond_one_portion_keep_their_places():
     one, all_found = golden.all_departures(few, 8), golden.all_departures(many, 8)
     assert np.array_equal(all_found.moments, np.concatenate([one.moments] * 45))
     assert np.array_equal(np.diff(all_found.offsets), np.tile(np.diff(one.offsets), 45))
-
-
-@pytest.mark.parametrize(
-    ("art", "connectivity", "steps", "departures"),
-    [
-        # one run above, none below: a step emits it with the next row
-        ("#.. ... ...", 8, (1, 1, 0), [(1, 1)]),
-        # the last row emits what it touches, too
-        ("... ... #.#", 8, (0, 0, 2), [(2, 1), (2, 2)]),
-        # two runs joined by one: max(2, 1) steps, and the zone leaves with the last of them
-        ("#.# ###", 8, (2, 2), [(1, 2)]),
-        ("#.# ###", 4, (2, 2), [(1, 2)]),
-        # three above one below, and one run that ends: 3 + 1 steps
-        ("#.#.#.# #####..", 8, (4, 4), [(1, 3), (1, 4)]),
-        # corners join with 8 and part with 4
-        ("#. .#", 8, (1, 1), [(1, 1)]),
-        ("#. .#", 4, (1, 2), [(1, 1), (1, 2)]),
-        # a zone in two clusters of the last strip leaves with the one on the right
-        ("##### #...# #....", 8, (1, 2, 2), [(2, 2)]),
-        # a single row
-        ("#.##.#", 8, (3,), [(0, 1), (0, 2), (0, 3)]),
-    ],
-)
-def test_step_rule_by_hand(art, connectivity, steps, departures):
-    work = labelling(cells_of(art), connectivity)
-    assert work.busy == tuple(count + 2 if count else 1 for count in steps)
-    assert work.end == work.busy[-1] + 2
-    assert [(zone.row, zone.clock - 3) for zone in work.departures] == departures
-
-
-@pytest.mark.parametrize(
-    ("art", "connectivity", "busy", "departures"),
-    [
-        # a clock per column and two more; the run above costs one, and the zone leaves after its column
-        ("#.. ... ...", 8, (5, 6, 5), [(1, 3)]),
-        ("... ... #.#", 8, (5, 5, 5), [(2, 2), (2, 4)]),
-        ("#.# ###", 8, (5, 7), [(1, 6)]),
-        # corners join with 8; with 4 a cluster right after another costs a clock, but only one with its run above
-        ("#. .#", 8, (4, 5), [(1, 4)]),
-        ("#. .#", 4, (4, 6), [(1, 3), (1, 5)]),
-        (".# #.", 4, (4, 5), [(1, 2), (1, 4)]),
-        # a zone in two clusters of the last strip leaves after the one on the right
-        ("##### #...# #....", 8, (7, 8, 9), [(2, 8)]),
-    ],
-)
-def test_column_rule_by_hand(art, connectivity, busy, departures):
-    work = labelling(cells_of(art), connectivity, "serial")
-    assert work.busy == busy
-    assert work.end == busy[-1]
-    assert [(zone.row, zone.clock) for zone in work.departures] == departures
 
 
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)

@@ -94,22 +94,6 @@ def test_where_the_units_fix_a_push_its_interval_holds_it_in_95_of_100(count, dr
     assert narrow < 0.95 - 3 * math.sqrt(0.95 * 0.05 / trials)
 
 
-@pytest.mark.campaign
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("surface", ["cylinder", "plane"])
-@pytest.mark.parametrize("drag", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_intervals_hold_pushes_over_many_contacts(count, drag, surface):
-    """95 % at least but for chance, and no more where the units alone fix them. Some 40 s in all."""
-    trials = 300 if count == 1 else 150
-    share, beyond = share_inside(count, drag, surface, trials, sigma_m=0.001, seed=7)
-    room = 3 * math.sqrt(0.95 * 0.05 / trials)
-    assert share >= 0.95 - room
-    assert drag < 1 or count == 3 or beyond > 0.1
-    if (surface == "plane" and drag < 1) or count == 1:
-        assert share <= 0.95 + room
-
-
 def test_a_drag_at_the_cone_is_reported_and_widens():
     """Two fingers side by side on a cylinder, 1 % inside friction's cone and 1 % beyond it."""
     cells, intervals = hexapod(60), []

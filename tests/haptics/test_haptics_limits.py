@@ -1,11 +1,9 @@
 """The time that forces take, the most contacts that a file may hold, and contacts nearly at one place."""
 
 import time
-import timeit
 
 import numpy as np
 import pytest
-from bumpers import exerted, hexapod, scattered
 
 from contactfpga.robot.haptics import contacts
 from contactfpga.robot.haptics.contact import Touch
@@ -25,27 +23,6 @@ def scene(rng, count, around_m, friction, sideways=0.0):
     six = np.concatenate([forces.sum(0), np.cross(places, forces).sum(0)])
     touches = [Touch(tuple(place), tuple(normal), friction) for place, normal in zip(places.tolist(), normals.tolist())]
     return Wrench(tuple(six[:3].tolist()), tuple(six[3:].tolist())), touches
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_a_frame_takes_no_longer_than_a_few_small_solves(count):
-    """Readings to contacts, with places that are unsure.
-
-    At most 50 us where numpy solves six equations in 6.7 us, with as much again for a busy machine: an idle one takes
-    6.2 solves for one contact and 7.7 for two. A round has one after the other, so that a busy machine slows them
-    alike.
-    """
-    cells, six = hexapod(60, 0.075), np.random.default_rng(1).random((6, 6))
-    points, normals = scattered(np.random.default_rng(1), count)
-    readings = np.linalg.solve(cells.matrix, exerted(points, -9 * normals).array)
-    pairs = [(tuple(p.tolist()), tuple(n.tolist())) for p, n in zip(points, normals)]
-    works = (
-        lambda: contacts(cells.wrench(readings), [Touch(*pair, 0.5, 0.002) for pair in pairs]),
-        lambda: np.linalg.solve(six, six[0]),
-    )
-    rounds = [[timeit.timeit(work, timer=time.thread_time, number=150) for work in works] for _ in range(25)]
-    takes, solve = np.min(rounds, axis=0)
-    assert takes / solve < 2 * 50 / 6.7
 
 
 @pytest.mark.parametrize("sideways", [0.0, 0.3])

@@ -1,15 +1,11 @@
 """Values worked out apart from the code, to all their digits."""
 
-import numpy as np
 import pytest
-from bumpers import exerted, hexapod, on_cylinder, touch, wrench
 
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, PaddedSheet
-from contactfpga.robot.haptics import Reach, contacts, posterior
-
-MU = 0.5
+from contactfpga.robot.haptics import Reach, posterior
 
 
 def digits(text):
@@ -19,39 +15,6 @@ def digits(text):
 
 def near(value, text):
     return value == pytest.approx(float(text), abs=digits(text))
-
-
-def test_one_contact_at_a_known_place():
-    cells = hexapod(45, 0.06)
-    loaded = wrench((-10, 0, 0, 0, -0.6, 0), cells.noise)
-    found = contacts(loaded, [touch((0.038, 0, 0.063), (1, 0, 0))])
-    assert near(found[0].force_n[0], "-9.976297")
-    assert found[0].force_n[1] == pytest.approx(0, abs=1e-12)
-    assert near(found[0].force_n[2], "-0.600474")
-    assert near(found.chi2, "63.207796")
-    assert (found.freedom, found.rank, found.null_space) == (3, 3, [])
-    sigmas = cells.noise_at((0.038, 0, 0.06))
-    assert all(near(*pair) for pair in zip(sigmas, ("0.0612372", "0.0456154", "0.0422131")))
-    found = contacts(loaded, [touch((0.038, 0, 0.06), (1, 0, 0))])
-    assert np.sqrt(np.diag(found.covariance_n2)) == pytest.approx(sigmas)
-
-
-@pytest.mark.parametrize(
-    ("places", "intervals"),
-    [
-        ([(0, 0.05), (90, 0.05)], [("10.666667", "16.000000"), ("2.666667", "8.000000")]),
-        ([(0, 0.04), (90, 0.10)], [("11.155754", "13.460945"), ("3.155754", "5.460945")]),
-        ([(0, 0.05), (180, 0.05)], [("8.000000", None), ("0.000000", None)]),
-    ],
-)
-def test_intervals_of_two_pushes(places, intervals):
-    points, normals = zip(*(on_cylinder(*place) for place in places))
-    loaded = exerted(points, [-12 * normals[0], -4 * normals[1]])
-    found = contacts(loaded, [touch(*pair, MU) for pair in zip(points, normals)])
-    assert found.rank == 5
-    for one, (low, high) in zip(found, intervals):
-        assert near(one.interval_n[0], low)
-        assert one.interval_n[1] is None if high is None else near(one.interval_n[1], high)
 
 
 @pytest.mark.parametrize(

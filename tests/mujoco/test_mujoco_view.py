@@ -10,11 +10,11 @@ pytest.importorskip("mujoco")
 pytest.importorskip("viser")
 
 import contactfpga
-from contactfpga.tools.view import chart, obstacle, opening
+from contactfpga.tools.view import obstacle, opening
 from contactfpga.tools.view.fingers import Finger
-from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SWEEP_S, SimulatedSource, Sweep
+from contactfpga.tools.view.robot_source import ALL, BARE, KIT, LATE, NO_REFLEX, SimulatedSource, Sweep
+from contactfpga_sim.lab import browser
 from contactfpga_sim.lab.mujoco.clip import SteppedPace
-from contactfpga_sim.lab.view import browser
 
 HERE = contactfpga.examples() / "arm"
 ROBOT, SCENE, REFLEXES = (str(HERE / name) for name in ("pushed.toml", "scene.xml", "reflexes.py"))
@@ -108,20 +108,6 @@ def test_copies_differ_by_when_their_reflex_knows_and_by_nothing_else():
     assert drawn == pytest.approx(list(most.values())), "the chart misses no peak"
 
 
-def test_every_start_is_the_same():
-    paths = []
-    source = started("BackOff", LATE)
-    for _ in range(2):
-        source.restart()
-        source.advance()
-        source.copies[0].sheets.data.qpos[0] = BEFORE_BAR
-        goes_on(source, 0.08)
-        paths.append((source.copies[0].most_n, source.copies[0].sheets.data.qpos[0]))
-    source.close()
-    assert paths[0] == paths[1]
-    assert paths[0][0]["arm"] > 1
-
-
 def test_a_sweep_begins_with_a_touch_and_stands_until_the_next_after_its_end():
     sweep = Sweep(2)
     forces = {0.01: (0, 1), 0.011: (3, 2), 0.012: (2, 0), 0.05: (0, 7)}
@@ -134,18 +120,6 @@ def test_a_sweep_begins_with_a_touch_and_stands_until_the_next_after_its_end():
     sweep.add(0.5, (0, 4))
     assert sweep.forces_n[:, 0].tolist() == [0, 4]
     assert np.isnan(sweep.forces_n[:, 1:]).all()
-
-
-def test_the_chart_names_its_curves_and_units():
-    forces = np.full((3, 100), np.nan)
-    forces[:, :50] = np.array([[23.7], [7.2], [3.6]])
-    drawn = chart.force_chart(forces, SWEEP_S, [(0, "bare"), (1, "late"), (2, "kit")])
-    for text in (">N<", ">30<", ">100<", "ms since the touch", ">bare<", ">late<", ">kit<"):
-        assert text in drawn
-    curves = [line.partition('"')[0].split() for line in drawn.split('<polyline points="')[1:]]
-    assert [len(curve) for curve in curves] == [50] * 3, "what is not known yet is not drawn"
-    heights = [float(curve[0].partition(",")[2]) for curve in curves]
-    assert heights[0] < heights[1] < heights[2]
 
 
 @pytest.mark.parametrize(("kind", "half_mm"), [(obstacle.BALL, 1.0), (obstacle.HAND, 80.0)])

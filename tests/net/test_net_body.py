@@ -69,24 +69,3 @@ def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, cap
                 wait_until(lambda: opened.latest().links["left"].status == "mismatch")
                 assert "was built from" in opened.latest().links["left"].reason
             wait_until(lambda: opened.latest().links["right"].status == "ok")
-
-
-def test_links_that_nobody_publishes_are_lost_and_leave_nothing_behind(robot, endpoint, monkeypatch):
-    """They are tried again and again: what a try leaves open would run out one day."""
-    psutil = pytest.importorskip("psutil")
-    monkeypatch.setattr("contactfpga.robot.net.port.FOUND_S", 0.02)
-    monkeypatch.setattr("contactfpga.robot.body.reader.RETRY_S", 0.02)
-    tries = []
-    with session.listening(endpoint):
-        opened = Body.load(robot).open()
-        states = opened.latest().links
-        assert {one.status for one in states.values()} == {"lost"}
-        assert all("is `contactfpga publish` running with this key?" in one.reason for one in states.values())
-        connected = session.connected
-        monkeypatch.setattr(session, "connected", lambda *names: tries.append(names) or connected(*names))
-        with opened:
-            counts = []
-            for number in (4, 24):
-                wait_until(lambda number=number: len(tries) >= number)
-                counts.append(psutil.Process().num_fds())
-    assert counts[1] < counts[0] + 10

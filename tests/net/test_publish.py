@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, background, wait_until
-from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint, patient, publish, router
+from net_processes import Streaming, assert_loopback_alone, free_endpoint, patient, publish, router
 
 import contactfpga
-from contactfpga.robot.net import port as net_port
 from contactfpga.robot.net import session
 from contactfpga.tools import cli
 from contactfpga.tools.commands import publish as command
@@ -41,10 +40,6 @@ def take(board, count, sent_us):
     times = [board.next(LONG).time_us for _ in range(count)]
     assert set(times) <= sent_us
     assert times == sorted(set(times))
-
-
-def take_until(board, condition, sent_us):
-    wait_until(lambda: take(board, 5, sent_us) or condition())
 
 
 def test_a_published_board_is_a_board(streaming, endpoint):
@@ -95,60 +90,6 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
             take(board, 20, streaming.sent_us)
         publisher.process.send_signal(signal.SIGINT)
         assert publisher.process.wait(LONG) == 1
-
-
-def pass_on(streaming):
-    """Wait until the publisher has sent frames that come from now on; ``streaming`` waits for it to read them."""
-    for _ in range(2):  # it reads again once it has sent
-        sent = streaming.sent
-        wait_until(lambda sent=sent: streaming.sent > sent + 100 and not streaming.waiting())
-
-
-@pytest.mark.slow
-def test_a_killed_publisher_is_lost_and_not_found_again(streaming, endpoint, monkeypatch):
-    monkeypatch.setattr(net_port, "GONE_S", LONG / 3)  # a busy machine lets who lives be silent, too
-    with router(endpoint):
-        with publish(streaming.path, "--connect", endpoint) as publisher:
-            with contactfpga.open(publisher.line, timeout=LONG) as board:
-                take(board, 1, streaming.sent_us)
-                os.kill(publisher.process.pid, signal.SIGKILL)
-                with pytest.raises(contactfpga.PortLost, match="its publisher ended, or the network is broken"):
-                    collections.deque((board.next(LONG) for _ in itertools.count()), maxlen=0)
-        monkeypatch.setattr(net_port, "FOUND_S", 0.5)
-        with pytest.raises(contactfpga.PortNotFound, match=r"nobody publishes it; is `contactfpga publish` running"):
-            contactfpga.open(publisher.line)
-
-
-@pytest.mark.slow
-def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(streaming, endpoint):
-    with router(endpoint):
-        with publish(streaming.path, "--connect", endpoint) as publisher:
-            board = contactfpga.open(port(endpoint, wait_s=60), timeout=LONG)
-            take(board, 20, streaming.sent_us)
-        publisher.end()
-        frames = board.stats.frames
-        with board, publish(streaming.path, "--connect", endpoint):
-            take_until(board, lambda: board.stats.frames > frames + 20, streaming.sent_us)
-            assert board.stats.net.publishers == 2
-            assert board.stats.lost > 0
-            assert board.stats.restarts == 0
-
-
-def test_a_link_that_flaps_loses_frames_and_counts_them(streaming, endpoint):
-    streaming.waits = True
-    with publish(streaming.path, "--listen", endpoint), Relay(endpoint) as relay:
-        with contactfpga.open(port(relay.endpoint, wait_s=60), timeout=LONG) as board:
-            for _ in range(2):
-                take(board, 20, streaming.sent_us)
-                relay.cut()
-                pass_on(streaming)
-                relay.mend()
-                frames = board.stats.frames
-                take_until(board, lambda frames=frames: board.stats.frames > frames + 20, streaming.sent_us)
-            assert board.stats.net.lost_messages > 0
-            assert board.stats.net.publishers == 1
-            assert board.stats.lost > 0
-            assert board.stats.restarts == 0
 
 
 def test_boards_that_go_together_are_reported_together(capsys, monkeypatch):

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from net_processes import PUBLISHER, patience
+from net_processes import PATIENCE, PUBLISHER
 from sample import sample
 from terminals import environment, listening
 
@@ -141,7 +141,7 @@ def test_commands_without_output_run_as_printed(page, tmp_path):
     with contextlib.ExitStack() as stack:
         running = {}
         for command in EARLIER.get(page, []) + RUN[page]:
-            program = ["-c", patience() + PUBLISHER] if page == "docs/net.md" else ["-m", "contactfpga"]
+            program = ["-c", PATIENCE + PUBLISHER] if page == "docs/net.md" else ["-m", "contactfpga"]
             words = [sys.executable, *program, *shlex.split(command)]
             options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "cwd": tmp_path, "preexec_fn": listening}
             process = running[command] = subprocess.Popen(words, **options, env=variables)

@@ -1,13 +1,11 @@
 """`make sim`: what it runs, and that it says so when gateware and model differ."""
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 
 from contactfpga_sim import demo
-from contactfpga_sim.model.scenes.scene import NAMES
 
 
 def assert_all_said(out, runs, picture):
@@ -18,16 +16,6 @@ def assert_all_said(out, runs, picture):
     said = " ".join(out.split())
     assert all(line in said for line in demo.LEGEND)
     assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.campaign  # every scene, and through Verilator, too
-def test_the_whole_command(tmp_path):
-    picture = tmp_path / "scenes.png"
-    command = [sys.executable, "-m", "contactfpga_sim.demo", "--picture", str(picture)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=280)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert {*demo.RUNS, "nothing"} == {*NAMES}
-    assert_all_said(done.stdout, demo.RUNS, picture)
 
 
 @pytest.mark.slow

@@ -140,12 +140,6 @@ def test_what_time_was_too_short_for_is_open_and_neither_reported_nor_proved(mon
 
 
 @pytest.mark.slow
-def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
-    untouched = Stimulus("untouched", Timeline([]), 12_000)
-    assert len(campaign.left_by(sample.skin, sample.mutants, [untouched])) > 2 * len(sample.left)
-
-
-@pytest.mark.slow
 def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
     model = netlist.model(sample.skin, sample.mutants)
     stimulus = next(stimuli.quick(sample.skin))
@@ -153,18 +147,6 @@ def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
         assert len(campaign.expected(board, stimulus)["bytes"]) > 100
     with CompiledBoard(sample.skin.replace(settle_us=31.0), campaign.OBSERVED, model) as board, pytest.raises(Mismatch):
         campaign.expected(board, stimulus)
-
-
-@pytest.mark.campaign
-def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
-    skin = SKINS["4x4, fast"]
-    mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=1)
-    left = campaign.left_by(skin, mutants, stimuli.quick(skin))
-    killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
-    noticed = [killed[stage] for stage in ("label", "link")]
-    proved = proof.equivalent(skin, [*noticed, *left[:6]], limit_s=4)
-    assert not any(proved[: len(noticed)])
-    assert any(proved[len(noticed) :])
 
 
 @pytest.mark.campaign

@@ -148,18 +148,6 @@ def test_merged_boards_of_one_topic_are_refused(tmp_path, both, capsys, apart):
         assert not (tmp_path / "x.csv").exists()
 
 
-@pytest.mark.parametrize("apart", [True, False])
-def test_recordings_one_after_the_other_may_be_merged(tmp_path, monkeypatch, apart):
-    files, sent = [tmp_path / f"{number}.mcap" for number in range(3)], b""
-    for number, file in enumerate(files):
-        monkeypatch.setattr(link_recorder, "offset_ns", lambda *clocks, number=number: 10**18 + number * 10**10)
-        port = StreamPort(frames=100 * (number + 1))
-        recorded(tmp_path, port, name=file.name, bytes_only=True)
-        sent += port.sent
-    rewritten(tmp_path / "x.mcap", *files, apart=apart)
-    assert b"".join(data for _, data in Recording(tmp_path / "x.mcap").raw_bytes()) == sent
-
-
 ROBOT = """
 [[links]]
 name = "arm"

@@ -1,6 +1,5 @@
 """Frames that wait to be written as messages when a recording ends."""
 
-import random
 import re
 import threading
 import time
@@ -12,7 +11,6 @@ from net_processes import Streaming
 from recorded_stream import replayed
 
 import contactfpga
-from contactfpga.driver.conversation import Conversation
 from contactfpga.recordings import Session
 from contactfpga.tools.recordings import link_recorder
 from contactfpga.tools.recordings.link_recorder import LinkMessages
@@ -64,33 +62,3 @@ def messages(file):
             for _, channel, message in found
             if channel.topic.endswith("/zones")
         ]
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed):
-    """Threads pause where bytes are taken, where frames are made of them, and where the recording ends."""
-    rng = random.Random(seed)
-
-    def paused(where, name):
-        before = getattr(where, name)
-
-        def pausing(*arguments):
-            if rng.random() < 0.2:
-                time.sleep(rng.random() * 0.02)
-            return before(*arguments)
-
-        monkeypatch.setattr(where, name, pausing)
-
-    paused(link_recorder.LinkRecorder, "take")
-    paused(link_recorder.LinkRecorder, "end_at")
-    paused(Conversation, "receive")
-    file = tmp_path / "touches.mcap"
-    with Streaming(contactfpga.Skin()) as board, Session(file) as session:
-        session.add(board.path, timeout=60.0)
-        time.sleep(rng.random() * 0.1)
-        session.start()
-        time.sleep(rng.random() * 0.3)
-        wait_until(lambda: session.frames > 1)
-    assert session.links[0].notes == []
-    assert len(messages(file)) > 1
-    assert messages(file) == times_us(file)

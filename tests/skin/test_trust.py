@@ -20,14 +20,8 @@ from contactfpga.tools import cli
 NAMED = "evil_module:x"
 ESCAPED = [
     'labeller = "evil_module:x"',
-    '"labeller" = "evil_module:x"',
-    "'labeller' = 'evil_module:x'",
     r'"l\u0061beller" = "evil_module\u003ax"',
-    r'labeller = "\U00000065vil_module\u003Ax"',
-    'labeller = """\nevil_module:x"""',
-    "labeller = '''evil_module:x'''",
     'scan = "evil_module.part:x.y"',
-    'debounce = ":x"',
     'converter = "evil_module:"',
 ]
 

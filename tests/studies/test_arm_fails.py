@@ -1,12 +1,8 @@
 """Where the arm fails, and what catches it."""
 
-import math
-
 import pytest
 from sample import sample
 
-from contactfpga.design.cover import point
-from contactfpga.design.cover.point import Switch
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.plant import Plant, finite
@@ -14,41 +10,10 @@ from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.world import Faults
 
 PAPER = Case.load("paper")
-UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
 
 
 def at_rest(result):
     return abs(result.course["speed_rad_s"][-1]) * 0.2 < 1e-3 and result.outcome.rest_s is not None
-
-
-@pytest.mark.slow
-def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
-    halfway = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
-    result = run(halfway, "uart")
-    outcome = result.outcome
-    assert outcome.closes_s is outcome.detected_s is None
-    assert outcome.zones == 0
-    assert outcome.reason == "torque"
-    assert at_rest(result)
-    needed = point.force_n(Switch(), 5e-3 * math.sqrt(2), 5e-3)
-    assert outcome.peak_force_n < needed / 3  # 64.8 N would close one
-    alone = run(halfway.but(control=UNLIMITED, run={"duration_s": 0.05}), "uart").outcome
-    assert alone.closes_s is None
-    assert alone.reason == ""
-
-
-BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("way", sample(["pin", "uart"], quick=["uart"]))
-def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
-    hunting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 0.0}), way)
-    assert hunting.outcome.reversals > 3
-    assert at_rest(hunting)
-    waiting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 2e-3}), way)
-    assert waiting.outcome.reversals == 1
-    assert waiting.outcome.reacts_s == hunting.outcome.reacts_s
 
 
 def test_a_step_that_is_too_long_is_refused_and_would_blow_up():
@@ -100,17 +65,6 @@ def test_a_board_or_host_that_dies_in_a_contact_does_not_drive_the_arm_back_for_
     gone = lever * (result.course["angle_rad"].max() - result.course["angle_rad"].min())
     ramp = PAPER.control.reverse_m_s**2 / (2 * PAPER.control.slowing_m_s2)
     assert gone < PAPER.control.retreat_m + ramp + 3e-3
-
-
-@pytest.mark.parametrize(
-    ("way", "who"), sample([("pin", "board"), ("uart", "board"), ("uart", "host")], quick=[("uart", "board")])
-)
-def test_one_that_dies_before_the_contact_leaves_it_to_the_torque_limit(way, who):
-    result = run(PAPER, way, faults=Faults(**{f"{who}_dies_s": 4e-3}))
-    assert result.outcome.reason == "torque"
-    assert at_rest(result)
-    limited = run(PAPER, "torque").outcome
-    assert result.outcome.peak_force_n == pytest.approx(limited.peak_force_n, rel=1e-9)
 
 
 def test_a_board_that_speaks_more_rarely_than_the_watchdog_waits_is_refused():

@@ -157,15 +157,3 @@ def test_the_command_says_what_touches_anywhere_come_to(tmp_path, monkeypatch, c
     assert (forces[1] <= forces[0]).all()
     assert (forces[2] <= forces[1] + 0.3).all()
     assert all(known["limit alone"]["torque_limit_first"])
-
-
-@pytest.mark.slow
-def test_the_gateware_takes_no_longer_than_its_bounds():
-    from contactfpga_sim.lab.arm import sweep
-
-    case = Case.load("paper")
-    bounds = sweep.bounds_s(case, Skin())
-    for way, name in (("uart", "UART"), ("pin", "pin")):
-        found = places.measured_s(case, Skin(), way)
-        assert len(found) == places.INSTANTS
-        assert 0 < min(found) < max(found) <= bounds[name]

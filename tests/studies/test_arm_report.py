@@ -1,11 +1,9 @@
-"""`contactfpga study arm`: its table, its pictures, its cases, and the push that it yields to."""
+"""`contactfpga study arm`: its table, its pictures and its cases."""
 
 import dataclasses
-import functools
 import json
 import re
 
-import numpy as np
 import pytest
 from study_pages import section
 
@@ -13,11 +11,10 @@ from contactfpga.design import kits
 from contactfpga.design.cover import load_cover
 from contactfpga.tools import cli
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.arm import comply, report, tables
-from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm import report, tables
+from contactfpga_sim.lab.arm.case import Case
 
 PAPER = Case.load("paper")
-PUSH = Case.load("push")
 
 
 @pytest.fixture(scope="module")
@@ -69,18 +66,6 @@ def test_a_skin_brings_its_own_cover_and_no_columns_of_the_paper(monkeypatch, ca
 
 
 @pytest.mark.slow
-def test_the_columns_are_what_they_are_called(found):
-    assert list(found) == ["6 ms", "UART", "pin", "limit alone", "at 12 N, 6 ms", "at 12 N, no limit"]
-    outcomes = [result.outcome for result in found.values()]
-    assert [outcome.reason for outcome in outcomes] == ["contact"] * 3 + ["torque"] * 2 + ["contact"]
-    closing = [result.course["force_n"][result.course["closed"].argmax()] for result in found.values()]
-    assert closing[:4] == pytest.approx([4.1556] * 4, rel=0.01)
-    assert closing[4:] == pytest.approx([12.0] * 2, rel=0.01)
-    assert outcomes[5].reacts_s - outcomes[5].closes_s == pytest.approx(6e-3, abs=0.25e-3)
-    assert outcomes[1].zones == 1
-
-
-@pytest.mark.slow
 def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_before):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["study", "arm", "--json", "--places", "0"]) == 0
@@ -98,23 +83,18 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
         ("[link]\ninertia_kgm2 = 1\nlever_m = 1\nspeed_m_s = 1\n", "the part [motor] is missing"),
         ('like = "paper"\n[arm]\n', "unknown part 'arm'"),
         ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
-        ('like = "paper"\n[foam]\ncut = true\n', "the model 'point' knows no cut"),
         ('like = "paper"\nmodel = "foam"\n[foam]\ncut = true\n', "give [cover.cap] as well"),
-        ('like = "paper"\nmodel = "foam"\n[switch]\ntravel_m = 1e-4\n', "only a switch under a proud cap"),
         ('like = "paper"\nmodel = "foam"\n[cap]\nside_m = 0.011\n', "a cap is 0.011 m wide; the pitch is 0.01 m"),
         ('like = "paper"\n[cap]\nside = 1\n', "unknown key 'side' in [cap]"),
-        ('like = "paper"\n[control]\nbehavior = "flee"\n', "behavior is 'flee'; it must be one of reverse, comply"),
         (
             'like = "paper"\n[control]\nperiod_s = 0.255e-3\n',
             "period_s is 0.000255; it must be a whole number of times",
         ),
         ('like = "paper"\n[run]\nstep_s = 3.125e-6\n', "step_s is 3.125e-06; it must be a whole number of clocks"),
-        ('like = "paper"\ntouch = []\n', "touch is empty"),
         (
             'like = "paper"\n[bed]\nthickness_m = 0.01\narea_m2 = 1e-3\nmass_kg = 0.1\n[[touch]]\n[[touch]]\n',
             "touch has 2 things; a board on a bed does not tilt",
         ),
-        ('like = "nobody"\n', "case 'nobody' is not known"),
         ("x = \n", "not a TOML file"),
         ('like = "paper"\n[[touch]]\nx_mm = 156.0\n', "x_mm of a touch is 156; the sheet ends at 155 mm"),
     ],
@@ -124,42 +104,6 @@ def test_a_case_that_cannot_be_is_refused_with_its_value(tmp_path, capsys, text,
     path.write_text(text)
     assert cli.main(["study", "arm", "--case", str(path), "--json"]) == 1
     assert said in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_the_arm_yields_to_a_push_and_returns_and_the_torque_stays_below_the_limit():
-    fastest = comply.fastest_m_s(PUSH)
-    push, result = comply.pushed(PUSH, fastest)
-    assert not result.events
-    assert push.peak_torque_nm < 3.0
-    assert np.abs(result.course["sensor_nm"]).max() == push.peak_torque_nm
-    assert push.yields_m == pytest.approx(PUSH.touch[0].push_m, rel=0.25)
-    assert push.back_s < PUSH.run.duration_s
-    assert 0.2 * abs(result.course["angle_rad"][-1]) < comply.BACK_M
-    beyond = comply.pushed(PUSH.but(run={"duration_s": 0.2}), fastest + 0.01)[0]
-    assert beyond.peak_torque_nm >= 3.0
-    assert fastest > 0.2
-
-
-def test_a_push_of_an_arm_that_does_not_comply_is_refused():
-    with pytest.raises(CaseError, match="behavior is 'reverse'"):
-        comply.pushed(PAPER, 0.1)
-
-
-@pytest.mark.slow
-def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
-    monkeypatch.setattr(comply, "fastest_m_s", lambda case: 0.25)
-    monkeypatch.setattr(comply, "SHARES", (1.0, 1.4))
-    monkeypatch.setattr(comply, "pushed", functools.cache(comply.pushed))
-    assert cli.main(["study", "arm", "--case", "push", "--json"]) == 0
-    known = json.loads(capsys.readouterr().out)
-    assert [push["stopped"] for push in known["pushes"]] == [False, True]
-    assert known["pushes"][0]["speed_m_s"] == known["fastest_m_s"] == 0.25
-    assert known["pushes"][1]["back_s"] is None
-    assert cli.main(["study", "arm", "--case", "push"]) == 0
-    said = capsys.readouterr().out
-    assert "stays below 3 Nm up to a push of 0.250 m/s" in said
-    assert "torque limit" in said
 
 
 @pytest.mark.slow

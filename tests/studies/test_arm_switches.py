@@ -1,4 +1,4 @@
-"""Switches under the arm's cover, one by one, and pushes over time."""
+"""Switches under the arm's cover, one by one."""
 
 import math
 
@@ -7,7 +7,6 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.parts import Touch
 from contactfpga_sim.lab.arm.world import Switches
 
 PAPER = Case.load("paper")
@@ -62,15 +61,3 @@ def test_a_switch_bounces_after_it_closes_and_after_it_opens():
     closing = [*bounce, *[True] * 40]
     opening = [*(not level for level in bounce), *[False] * 40]
     assert levels == [*[False] * 20, *closing, *opening]
-
-
-def test_a_push_comes_holds_and_goes_back_as_fast():
-    touch = Touch(push_m_s=0.2, push_m=0.03, hold_s=0.1)
-    times = np.linspace(-0.1, 0.6, 7001)
-    ways, speeds = np.array([touch.pushed(float(time)) for time in times]).T
-    corners = ([-1.0, 0.0, 0.15, 0.25, 0.4, 1.0], [0.0, 0.0, 0.03, 0.03, 0.0, 0.0])
-    assert ways == pytest.approx(np.interp(times, *corners), abs=1e-12)
-    slopes = np.gradient(ways, times)
-    inside = np.abs(np.subtract.outer(times, corners[0])).min(axis=1) > 2e-4
-    assert speeds[inside] == pytest.approx(slopes[inside], abs=1e-9)
-    assert Touch().pushed(1.0) == (0.0, 0.0)

@@ -35,5 +35,5 @@ def test_a_force_threshold_reacts_where_no_switch_closes():
 def test_a_board_without_the_plain_sum_is_refused(capsys):
     with pytest.raises(CaseError, match=r"units is 0; the way 'force' needs units = 3"):
         run(PAPER, "force", skin=Skin())
-    assert cli.main(["study", "arm", "--force-threshold", "--case", "push"]) != 0
+    assert cli.main(["study", "arm", "--force-threshold", "--skin", "examples/fast.toml"]) != 0
     assert "--force-threshold runs its own Skin" in capsys.readouterr().err

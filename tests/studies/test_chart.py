@@ -20,7 +20,7 @@ from contactfpga.wire import protocol
 from contactfpga_sim.apps import errors, result_cache, score, speed, stats
 from contactfpga_sim.apps.errors import Blob
 from contactfpga_sim.lab.benchmark import entries
-from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, picture, tables, times, times_picture
+from contactfpga_sim.lab.chart import compute, front_picture, host, numbers, tables, times
 from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.levels.tables import SCORES
@@ -227,17 +227,6 @@ def test_a_touch_that_closes_nothing_takes_forever():
     assert found.not_felt.mean == pytest.approx(2 / 3)
 
 
-@pytest.mark.slow
-def test_switches_that_close_one_after_the_other_go_through_the_gateware(monkeypatch):
-    skin, cover = METHODS["run, 20 mm, tiles"]
-    scenes = touches("edge", 3, 5, skin, cover)
-    assert max(len(times.closing(scene, skin, cover)[1]) for scene in scenes) > 1
-    times.measured(scenes, skin, cover, 0, checked=3)
-    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: predict(skin.replace(settle_us=6.0), *rest))
-    with pytest.raises(Mismatch):
-        times.measured(scenes, skin, cover, 0, checked=1)
-
-
 @pytest.mark.parametrize("share", [0.5, 0.95])
 def test_the_interval_of_a_quantile_holds_it_95_times_of_100(share):
     rng = np.random.default_rng(6)
@@ -334,30 +323,3 @@ def test_the_picture_of_the_front_has_its_entries_where_their_scores_say():
     (ring,) = (line for line in figure.axes[0].lines if line.get_markersize() > 10)
     kits = [line for line in lines if line["entry"] == "domes, 6.4 mm" and line["family"] != "all"]
     assert ring.get_ydata()[0] == pytest.approx(100 * max(float(line["wrong"]) for line in kits))
-
-
-def test_what_is_never_felt_is_drawn_as_never():
-    points = [one for one in numbers.read(ROOT / tables.NUMBERS) if one.task.family == "palm"]
-    assert any(math.isinf(compute.reached_us(one)) for one in points)
-    panel = picture.picture(points).axes[0]
-    assert "never" in [label.get_text() for label in panel.get_xticklabels()]
-    assert picture.NEVER_US in [line.get_xdata()[0] for line in panel.lines if line.get_marker() in "sv^oD"]
-    rows = times_picture.picture(points).axes[0]
-    assert [label.get_text() for label in rows.get_yticklabels()] == [one.task.method for one in points]
-
-
-@pytest.mark.campaign
-@pytest.mark.timeout(7200)
-def test_the_pages_numbers_are_found_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "NUMBERS", tmp_path / "chart.csv")
-    for found, shown in zip(tables.compute(), numbers.read(ROOT / "docs/chart/chart.csv"), strict=True):
-        assert dataclasses.replace(found, host_us=shown.host_us) == shown
-
-
-@pytest.mark.slow
-def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
-    monkeypatch.setattr(tables, "SIDES", (16,))
-    monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
-    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in str(tables.host_table()).splitlines()[2:]}
-    # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
-    assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}

@@ -1,7 +1,6 @@
 """The numbers in the diagrams, which are committed drawings, are those of commands, pages and code."""
 
 import contextlib
-import csv
 import io
 import itertools
 import json
@@ -17,7 +16,6 @@ from contactfpga.boards import wiring
 from contactfpga.design import kits
 from contactfpga.design.circuit import load_circuit
 from contactfpga.design.cover import load_cover
-from contactfpga.design.sheet import files
 from contactfpga.tools import cli
 from contactfpga_sim.apps.latency.stages import ASSUMED_HOST_US
 from contactfpga_sim.lab.kits import steps
@@ -99,26 +97,6 @@ def test_the_wiring_is_the_table_that_the_command_prints():
             number = min(row, key=lambda other: abs(middle(other)[0] - x))
             shown[one.text] = f"{above} {number.text}"
     assert shown == table
-
-
-def test_the_wiring_shows_where_the_sheet_has_each_column():
-    """Right of each pin's number, below the name of its header, as in the list that ``contactfpga sheet`` writes."""
-    picture = words("wiring")
-    headers = {one.text.split()[0]: middle(one)[1] for one in picture if re.match(r"J\d ", one.text)}
-    shown = set()
-    for one in picture:
-        if re.fullmatch(r"(guard )?column( \d+)?", one.text):
-            x, y = middle(one)
-            header = max((name for name, place in headers.items() if place < y), key=headers.get)
-            left = [n for n in picture if abs(middle(n)[1] - y) < 3 and n.text.isdigit() and middle(n)[0] < x]
-            shown.add(
-                (header, max(left, key=lambda n: middle(n)[0]).text, one.text.replace("guard column", "column GUARD"))
-            )
-    listed = csv.DictReader(files.connectors_list(KIT.layout).splitlines())
-    columns = {(row["connector"], row["pin"], row["line"]) for row in listed if row["line"].startswith("COL")}
-    assert shown == {
-        (header, pin, line.replace("COL_", "COL").replace("COL", "column ")) for header, pin, line in columns
-    }
 
 
 def test_the_wiring_names_the_parts_on_the_sheet():

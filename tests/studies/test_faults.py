@@ -18,8 +18,6 @@ LIMIT_US = 2 * GUARDED.derived.frame_clocks // GUARDED.derived.clocks_per_us + 1
 """Two frames and a millisecond: what guard lines promise."""
 
 GUARDED_TELLS = {"broken row", "broken column", "row connector", "column connector", "selected row", "stuck column"}
-FLAGGED_ANYHOW = {"selected row", "stuck column"}
-"""Columns that read pressed while no row is driven."""
 NEVER = {"closed switch", "dead switch", "shorted columns", "broken contact"}
 
 
@@ -131,13 +129,3 @@ def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
     lines = tables.coverage_table().splitlines()[2:]
     listed, places = len(FAULTS), len(FAULTS) + 2
     assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("fault", ["shorted diode", "shorted rows", "shorted columns"])
-def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
-    times = list(compute.times_at_start(fault).values())
-    assert len(times) > 10
-    assert None not in times
-    assert max(times) < compute.clocks(compute.TESTED) / compute.TESTED.derived.clocks_per_us < 100
-    assert compute.told_us(SheetFault()) is None

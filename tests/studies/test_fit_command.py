@@ -1,25 +1,20 @@
-"""The command `contactfpga fit`, and what its page quotes."""
+"""The command `contactfpga fit`."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from amaranth.back import rtlil
-from fits import BUMPER, HANDS, chosen
-from recorded_frames import path_of
-from study_pages import section
+from fits import BUMPER, HANDS
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import size
 from contactfpga_sim.apps.fit import search
-from contactfpga_sim.lab.studies import STUDIES
 
 pytestmark = pytest.mark.usefixtures("alone")
 
 UNSOLVED = 3
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.slow
@@ -101,20 +96,3 @@ def test_a_recording_of_few_frames_is_refused(tmp_path, capsys):
     np.save(tmp_path / "few.npy", np.ones((3, 4, 4), bool))
     assert cli.main(["fit", str(tmp_path / "few.npy")]) == 1
     assert "few.npy has 3 frames; two to choose with and two to report are the least" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", STUDIES["fit"].sections)
-def test_the_page_shows_what_the_examples_say(name):
-    text = section("fit.md", name)
-    command = text.partition("\n")[0].strip()
-    assert command.startswith("contactfpga fit examples/")
-    assert command in (ROOT / command.split()[2]).read_text()
-    assert (text.count("| the answer |"), text.count("| runner-up |")) == (2, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.recordings
-def test_real_contacts_need_an_exact_labeller(shortcuts):
-    found = chosen(str(path_of("dtmf16x16")), pitches=None, latency_us=None)
-    assert found.answer.skin.labeller == "serial"
-    assert found.answer.skin.connectivity == 8

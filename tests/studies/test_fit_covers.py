@@ -80,13 +80,6 @@ def test_the_sheet_is_the_coarsest_of_all_that_are_good_enough(seed, file, short
     assert agrees(file(random_file(seed)))
 
 
-@pytest.mark.campaign
-@pytest.mark.timeout(7200)
-@pytest.mark.parametrize("seed", range(4, 54))
-def test_the_sheet_is_the_coarsest_of_all_in_many_files(seed, file, shortcuts):
-    assert agrees(file(random_file(seed)))
-
-
 def test_a_share_lies_beyond_its_bound_no_more_often_than_said():
     """Over all numbers of successes, by the binomial distribution."""
     for count, chance, err in ((20, 0.05, 0.01), (160, 0.05, 0.005), (500, 0.01, 0.005)):

@@ -13,12 +13,10 @@ from contactfpga_sim.lab.flips import campaign, flip, reference, summary, tables
 from contactfpga_sim.lab.flips.campaign import DESIGNS, Row
 from contactfpga_sim.lab.flips.flip import Flip, FlipOutcome
 from contactfpga_sim.lab.flips.reference import DeliveredFrame, Reference
-from contactfpga_sim.lab.flips.summary import Design
 from contactfpga_sim.model.board import native, state
 from contactfpga_sim.model.board.state import Bit
 
 PLAIN = Skin(rows=4, columns=4, labeller="serial", fail_safe=True, clock_hz=4_000_000, baud=1_000_000)
-DUAL = PLAIN.replace(dual=True, fail_safe=False)
 
 
 def made(skin):
@@ -35,11 +33,6 @@ def made(skin):
 @pytest.fixture(scope="module")
 def plain():
     yield from made(PLAIN)
-
-
-@pytest.fixture(scope="module")
-def dual():
-    yield from made(DUAL)
 
 
 def place_of(board, name):
@@ -101,32 +94,6 @@ def fast():
     yield from made(campaign.skin("run").replace(send="on_change", scan="reversal", precharge_us=0.5))
 
 
-@pytest.mark.slow  # which has a board of its own to compile
-def test_the_reference_of_a_scan_that_waits_is_right_and_finds_touches_from_rest(fast):
-    heard = [one for step in fast.steps[4:] for one in step.heard]
-    assert flip._wrong(fast, heard) == []
-    assert not any(one.flagged for one in heard)
-    assert sum(one.said[0] == 0 for one in heard) >= len(fast.steps) // touches.PERIOD - 1
-
-
-@pytest.mark.slow
-def test_a_scan_that_waits_and_hears_of_no_touch_is_stale(fast):
-    heard = [one for step in fast.steps[4:] for one in step.heard]
-    from_rest = next(index for index, one in enumerate(heard) if index and one.said[0] and not heard[index - 1].said[0])
-    del heard[from_rest : from_rest + 2]
-    assert "stale" in {kind for _, kind in flip._wrong(fast, heard)}
-
-
-@pytest.mark.campaign  # which has a board of its own to compile
-@pytest.mark.parametrize("copy", ["first", "second"])
-@pytest.mark.parametrize("place", ["scan.frame_clock.time", "transmitter.shift", "scan.driver.selected"])
-def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
-    bit = Bit(place_of(dual.board, f"dual.{copy}.{place}"), 0, 2)
-    found = [flip.follow(dual, Flip(bit, dual.step_clocks * 24 + clock)) for clock in (17, 4321)]
-    assert {one.outcome for one in found} <= {"told", "masked"}
-    assert "restarts" in {one.kind for one in found}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "bits"),
@@ -158,30 +125,6 @@ def test_a_queue_that_lost_its_place_is_right_again(plain, place):
     for bit in range(plain.board.places[index].width):
         _, heard, _ = flip._run(plain, Flip(Bit(index, 0, bit), plain.step_clocks * number + 17))
         assert [one.said for one in heard][-30:] == right[-30:]
-
-
-@pytest.mark.slow
-def test_contact_is_high_from_a_restart_until_a_frame_after_it():
-    board = state.StateBoard(PLAIN, ("contact", "received"))
-    board.press(np.zeros((4, 4), bool))
-    board.run(10_003)
-    assert board.take("contact")["data"].tolist() in ([], [0])
-    board.flip(Bit(place_of(board, "scan.frame_clock.time"), 0, 20))
-    board.run(10_000)
-    rises, falls = board.take("contact")
-    assert (rises["data"], falls["data"]) == (1, 0)
-    assert rises["cycle"] - 10_003 <= 3
-    scan = PLAIN.derived.frame_clocks
-    assert scan < falls["cycle"] - rises["cycle"] < 2 * scan + 100
-    board.close()
-
-
-@pytest.mark.slow
-def test_a_bit_that_nothing_reads_changes_nothing(plain):
-    place = place_of(plain.board, "link.store")
-    last = plain.board.places[place].depth // 2 - 1  # the end of a region, where short frames never come
-    found = flip.follow(plain, Flip(Bit(place, last, 3), plain.step_clocks * 23 + 5))
-    assert (found.outcome, found.frames) == ("masked", 0)
 
 
 def fake(send="always"):
@@ -249,29 +192,6 @@ def test_the_page_says_what_the_numbers_beside_it_say():
     assert not outdated("flips", tables.FlipResults(rows, sizes))
 
 
-def test_tables_count_what_came_out():
-    found = FlipOutcome("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
-    rows = [
-        Row("run", found),
-        *3 * [Row("run", found._replace(outcome="masked", kind=""))],
-        Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
-    ]
-    found = tables.FlipResults(rows, [Design("run", 1700, 1000, 14000)])
-    worst = [
-        "- Flips of registers with one copy: one of `scan.time` in `run` was silently wrong for 250.0 ms (time).",
-        "1 of 4 were silently wrong (4.6 to 69.9 %), 1 of them for more than 5 ms (4.6 to 69.9 %).",
-        "- Flips of memory with one copy:",
-        "0 of 1 were silently wrong (0.0 to 79.3 %), 0 of them for more than 5 ms (0.0 to 79.3 %).",
-        "A flip that was not drawn may be worse than all of these.",
-    ]
-    assert tables.worst_text(found).split() == " ".join(worst).split()
-    registers, memory = str(tables.designs_table(found)).splitlines()[2:]
-    assert registers.startswith(
-        "| `run` | 1,700 | 1,000 of registers | 4 | **25.0 %**, 4.6 to 69.9 % | 250.0 / 250.0 |"
-    )
-    assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
-
-
 def test_a_flip_that_drives_pins_against_each_other_is_followed_and_counted():
     """Of the rows that a board of driven columns selects: a driven column meets one in a pressed switch."""
     skin = PLAIN.replace(scan="reversal", precharge_us=1.0, project_us=1.0, send="on_change", fail_safe=False)
@@ -285,13 +205,3 @@ def test_a_flip_that_drives_pins_against_each_other_is_followed_and_counted():
         fights = [one.fights for one in found]
         assert 0 < max(fights) < 100
         assert 0 in fights
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("design", [name for name in DESIGNS if name.endswith("dual")])
-def test_no_flip_of_two_copies_is_silently_wrong(design):
-    made = Reference(campaign.skin(design))
-    found = [flip.follow(made, each) for memory in (False, True) for each in flip.drawn(made, memory, 50, 99)]
-    assert [one for one in found if one.outcome == "silent"] == []
-    assert {one.outcome for one in found} == {"masked", "told"}
-    made.board.close()

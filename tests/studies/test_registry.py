@@ -34,7 +34,7 @@ PLACES = [
 SECTIONS = [(study.name, name, section) for study in DECLARED for name, section in study.sections.items()]
 QUICK = {"cover", "failures", "haptics", "kits", "maker", "safety", "settle", "skin", "units"}
 """Studies whose samples `make test` makes; the other samples are for `make test-all`."""
-WHOLE = {"arm", "arm pushes", "closed", "fit", "maker pulls", "maker series", "performance",
+WHOLE = {"arm", "closed", "fit", "maker pulls", "maker series", "performance",
          "safety", "tracking scores"}  # fmt: skip
 """Studies, and sections, that `make campaign` makes whole; of a section that is named no sample is made."""
 SHOWN = [
@@ -50,7 +50,7 @@ SHOWN = [
     ),
 ]
 DRAWN = [
-    *("net", "scenes", "tracking"),
+    *("scenes", "tracking"),
     pytest.param("arm", marks=(pytest.mark.campaign, pytest.mark.timeout(7200))),
 ]
 
@@ -153,9 +153,9 @@ def test_a_section_shows_a_picture_or_at_most_eight_rows(study, name):
         assert all(row in picked for row in page)
 
 
-MEASURED_ONCE = {"rivals-rivals.csv", "rivals-rivals_exact.csv", "rivals-rivals_made_of.csv"}
+MEASURED_ONCE = {"rivals-rivals.csv", "rivals-rivals_exact.csv", "rivals-rivals_made_of.csv", "net-links.csv"}
 WRITTEN_ELSEWHERE = MEASURED_ONCE | {"formal-claims.csv", "mutants-alive.csv", "verification.csv"}
-"""By hand, by `make verification`, and from what scripts/rivals.py prints."""
+"""By hand, or by `make verification`."""
 
 
 def test_each_file_beside_the_pages_belongs_to_a_section():
@@ -258,19 +258,6 @@ def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_els
     assert stale() == []
     code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
     assert len(stale()) == 2
-
-
-@pytest.mark.slow
-def test_what_is_measured_of_netlists_is_out_of_date_once_a_netlist_is_another(monkeypatch):
-    from contactfpga_sim.apps import size
-    from contactfpga_sim.lab.closed import tables
-
-    monkeypatch.setattr(size.result_cache, "cached", None)  # nothing is measured
-    closed, skin_of = STUDIES["closed"], tables.skin_of
-    before = fingerprints.fingerprint(closed, "closed_size")
-    assert fingerprints.fingerprint(closed, "closed_size") == before
-    monkeypatch.setattr(tables, "skin_of", lambda *given: skin_of(*given).replace(columns=12))
-    assert fingerprints.fingerprint(closed, "closed_size") != before
 
 
 def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):

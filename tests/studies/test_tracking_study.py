@@ -4,7 +4,6 @@ import csv
 import importlib.util
 import itertools
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from contactfpga_sim.lab.tracking import scenes, scores, tables
 from contactfpga_sim.lab.tracking.scores import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/tracking.md"
 PITCH_MM = 10.0
 PAGE_RATES = ("100", "10,000")
 NAMES = [name for name in scores.TRACKERS if name != "Norfair" or importlib.util.find_spec("norfair")]
@@ -79,17 +77,6 @@ def test_scores_are_those_counted_by_hand():
     assert found.idf1 == pytest.approx(2 * 6 / (8 + 8))
 
 
-@pytest.mark.slow  # 60 s
-@pytest.mark.parametrize("family", scenes.FAMILIES)
-def test_the_tracker_is_behind_no_other_beyond_the_interval(family):
-    """On scenes that it was not tuned on, nor the page's: their numbers are others."""
-    pytest.importorskip("motmetrics")
-    found = scores.of_family(family, 100.0, names=tuple(NAMES))
-    for other in found:
-        gained, half = scores.ahead(found["`Tracker`"], found[other])
-        assert gained + half >= -1e-9, other
-
-
 def test_on_the_page_it_is_behind_no_other_at_any_rate():
     rows = [line[2:-2].split(" | ") for line in section("tracking.md", "ahead").splitlines()[2:]]
     assert {(row[0].strip("`"), row[1]) for row in rows} == set(itertools.product(scenes.FAMILIES, PAGE_RATES))
@@ -104,17 +91,6 @@ def test_on_the_page_it_is_ahead_in_the_mean_at_each_rate():
     assert [row[1] for row in means] == ["25", *PAGE_RATES]
     for ours, *others in ([float(cell.strip("*")) for cell in row[2:6]] for row in means):
         assert ours > max(others)
-
-
-def test_constant_velocity_goes_on_where_its_speed_puts_it():
-    """A zone that moves by 3 cells a frame, hides for 3 frames and is there again; the nearest zone loses it."""
-    for make, ids in ((scores.constant_velocity, {1}), (scores.TRACKERS["nearest zone"], {1, 2})):
-        update, found = make(), set()
-        for number in [*range(8), *range(11, 15)]:
-            cells = np.zeros((16, 16), bool)
-            cells[5, number] = True
-            found |= set(update(scenes.zones_of(cells, 20_000 * number)[0]))
-        assert found == ids
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -161,19 +137,6 @@ def test_a_row_of_the_scores_is_up_to_date():
         row = next(row for row in csv.reader(file) if row[:2] == ["`meeting`", "100"])
     cells = [f"{100 * one.idf1:.1f} ± {100 * one.half:.1f}" for one in found.values()]
     assert row[2 : 2 + len(cells)] == cells
-
-
-def test_the_picture_shows_the_scores_of_the_tables_file(tmp_path, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    seen = []
-    monkeypatch.setattr(tables.style, "save", lambda figure, path: seen.append(figure))
-    tables.draw(tmp_path)
-    crossing = next(axes for axes in seen[0].axes if axes.get_title(loc="left") == "crossing")
-    with open(ROOT / "docs/tables/tracking-scores.csv", encoding="utf-8") as file:
-        lines = [line for line in file if line.startswith("`crossing`,")]
-    norfair = [float(re.findall(r"([\d.]+) ±", line)[3]) for line in lines]
-    assert crossing.lines[3].get_ydata().tolist() == norfair
-    assert crossing.lines[3].get_xdata().tolist() == [25, 100, 10_000]
 
 
 def test_ten_thousand_frames_per_second_with_two_contacts():

@@ -1,14 +1,12 @@
 """Publishers and routers in processes of their own, on free ports of this machine."""
 
 import contextlib
-import json
 import os
 import socket
 import subprocess
 import sys
 import threading
 import time
-from typing import NamedTuple
 
 from fake_board import FakeBoard
 
@@ -34,32 +32,6 @@ sys.exit(main())
 """
 
 
-READER = """
-import dataclasses, json, sys, time
-import contactfpga
-board = contactfpga.open(sys.argv[1], timeout=60)
-clock, looked_s = board._link.clock, 0.0
-
-def look():
-    global looked_s
-    looked_s = clock()
-    return looked_s
-
-board._link.clock = look
-while True:
-    found = None
-    try:
-        found, at_s = board.latest(60, max_age_s=float(sys.argv[2])), looked_s
-    except contactfpga.NoData:
-        at_s = clock()
-    stats = board.stats
-    seen = stats.frames + stats.lost + stats.unexplained
-    line = [found and found.time_us, at_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
-    print(json.dumps(line), flush=True)
-    time.sleep(0.005)
-"""
-
-
 def free_endpoint(protocol="tcp"):
     """A port that nobody listens on."""
     with socket.socket() as one:
@@ -67,13 +39,12 @@ def free_endpoint(protocol="tcp"):
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
 
 
-def patience(lease_s=LONG_S):
-    """How a program begins that waits long for others, and takes them for gone after its lease."""
-    return f"""
+PATIENCE = f"""
 from contactfpga.robot import net
 import contactfpga.robot.net.port, contactfpga.robot.net.session
-net.port.FOUND_S, net.session.CONNECT_MS, net.session.LEASE_MS = {LONG_S}, {LONG_S:.0f}_000, {round(1000 * lease_s)}
+net.port.FOUND_S, net.session.CONNECT_MS, net.session.LEASE_MS = {LONG_S}, {LONG_S:.0f}_000, {LONG_S:.0f}_000
 """
+"""How a program begins that waits long for others."""
 
 
 def wait_long(monkeypatch):
@@ -121,47 +92,15 @@ class Child:
         self.end()
 
 
-def router(endpoint, lease_s=LONG_S):
+def router(endpoint):
     """A Zenoh session that is nothing but a router."""
-    return Child("-c", patience(lease_s) + ROUTER, endpoint)
+    return Child("-c", PATIENCE + ROUTER, endpoint)
 
 
-def publish(port, *options, others=(), wait=True, lease_s=LONG_S):
+def publish(port, *options, others=(), wait=True):
     """``contactfpga publish`` of a port and others."""
     arguments = ("publish", port, *others, "--timeout", LONG_S, *options)
-    return Child("-c", patience(lease_s) + PUBLISHER, *arguments, wait=wait)
-
-
-class Sight(NamedTuple):
-    """What a :class:`Reader` says again and again."""
-
-    time_us: int | None
-    """Of the latest frame; None: there was no data."""
-    at_s: float
-    """When the reader last looked at the clock before it returned that frame: this program may rest after that."""
-    seen: int
-    """Frames that came or are known not to have come."""
-    hellos: int
-    restarts: int
-    net: dict
-
-
-class Reader(Child):
-    """A program that takes the latest frame of a port, none older than ``max_age_s``."""
-
-    def __init__(self, port, max_age_s, lease_s):
-        super().__init__("-c", patience(lease_s) + READER, port, max_age_s)
-        self.sights = [Sight(*json.loads(self.line))]
-        self._listener = threading.Thread(target=self._listen, daemon=True)
-        self._listener.start()
-
-    def end(self):
-        self.process.kill()
-        self._listener.join()  # else both would read what it printed, and one after it is closed
-        return super().end()
-
-    def _listen(self):
-        self.sights += (Sight(*json.loads(line)) for line in self.process.stdout)
+    return Child("-c", PATIENCE + PUBLISHER, *arguments, wait=wait)
 
 
 class Streaming(FakeBoard):
@@ -201,40 +140,24 @@ class Streaming(FakeBoard):
 
 
 class Relay:
-    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first.
-    ``bytes_s``: what it carries per second, with little memory; None: all there is."""
+    """A cable between a program and an endpoint that carries ``bytes_s`` per second, with little memory."""
 
-    def __init__(self, endpoint, bytes_s=None):
+    def __init__(self, endpoint, bytes_s):
         self.bytes_s = bytes_s
         host, _, number = endpoint.partition("/")[2].rpartition(":")
         self._target = host, int(number)
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
-        self._whole = threading.Event()
-        self._whole.set()
         self._sockets, self._carriers = [], []
         self._server = threading.Thread(target=self._serve, daemon=True)
         self._server.start()
-
-    def cut(self):
-        self._whole.clear()
-        for one in self._sockets:
-            with contextlib.suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
-
-    def mend(self):
-        self._whole.set()
 
     def _serve(self):
         with contextlib.suppress(OSError):
             while True:
                 near, _ = self._listener.accept()
-                if not self._whole.is_set():
-                    near.close()
-                    continue
                 far = socket.socket()
-                if self.bytes_s is not None:
-                    far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
+                far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
                 try:
                     far.connect(self._target)
                 except OSError:  # nobody listens there now
@@ -250,8 +173,7 @@ class Relay:
         with contextlib.suppress(OSError):
             while data := source.recv(CHUNK):
                 sink.sendall(data)
-                if self.bytes_s is not None:
-                    time.sleep(len(data) / self.bytes_s)
+                time.sleep(len(data) / self.bytes_s)
             sink.shutdown(socket.SHUT_RDWR)
 
     def __enter__(self):
@@ -261,7 +183,9 @@ class Relay:
         with contextlib.suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)  # ends its thread, which may just be opening more
         self._server.join()
-        self.cut()
+        for one in self._sockets:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
         for one in self._carriers:
             one.join()
         for one in (self._listener, *self._sockets):

@@ -24,7 +24,6 @@ REFUSED = [
     # pressure units
     ({"units": 9}, "units is 9; MCP3208 has 8 channels"),
     ({"units": -1}, "units is -1; MCP3208 has 8 channels"),
-    ({"units": 2.5}, "units is 2.5; it must be a whole number"),
     (
         {"units": 2, "converter": "ads"},
         "converter is 'ads'; it must be one of 'mcp3208', 'ads131m08', or 'module:attribute' of your own",
@@ -38,38 +37,25 @@ REFUSED = [
         {"units": 1, "unit_sums": [[1]] * 5},
         "unit_sums is [[1], [1], [1], [1], [1]]; it must be a list of at most 4 lists of weights",
     ),
+    ({"units": 1, "unit_sums": [[0]]}, "unit_sums holds [0]; it must hold a weight for each of 1 units, not all 0"),
     ({"units": 2, "unit_sums": [[1]]}, "unit_sums holds [1]; it must hold a weight for each of 2 units, not all 0"),
-    (
-        {"units": 2, "unit_sums": [[0, 0]]},
-        "unit_sums holds [0, 0]; it must hold a weight for each of 2 units, not all 0",
-    ),
     ({"units": 2, "unit_sums": [[1, 128]]}, "unit_sums holds [1, 128]; weights are whole numbers from -127 to 127"),
     # the sheet
-    ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
-    ({"columns": 0}, "columns is 0; it must lie between 1 and 64"),
-    ({"columns": 65}, "columns is 65; it must lie between 1 and 64"),
-    ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
     ({"rows": True}, "rows is True; it must be a whole number"),
+    ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
+    ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
     ({"pitch_x_mm": 0}, "pitch_x_mm is 0.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_y_mm": 1001}, "pitch_y_mm is 1001.0; it must lie between 0.01 and 1000.0 mm"),
     ({"pitch_x_mm": float("nan")}, "pitch_x_mm is nan; it must be a finite number"),
-    ({"pitch_x_mm": "10"}, "pitch_x_mm is '10'; it must be a finite number"),
-    ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
-    ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
     ({"connectivity": 8.0}, "connectivity is 8.0; it must be one of 4, 8"),
-    ({"surface": ["plane"]}, "surface is ['plane']; it must be one of 'plane', 'cylinder'"),
+    ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
     ({"mask": [(0, 1.0)]}, "mask holds (0, 1.0); it must hold [row, column] pairs"),
     # its surface
     ({"surface": "sphere"}, "surface is 'sphere'; it must be one of 'plane', 'cylinder'"),
     ({"radius_mm": 50}, "radius_mm is 50.0; a plane has none, leave it out"),
     ({"surface": "cylinder"}, "radius_mm is missing; surface = 'cylinder' needs it"),
     ({"surface": "cylinder", "radius_mm": 0.05}, "radius_mm is 0.05; it must lie between 0.1 and 100000.0 mm"),
-    (
-        {"surface": "cylinder", "radius_mm": 25},
-        "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet; set "
-        "closed = true, or use at most 15 columns",
-    ),
     (
         {"surface": "cylinder", "radius_mm": 1.0, "columns": 1},
         "1 columns of 10.0 mm take 10 mm of a circumference of 6.28319 mm: the sheet's ends meet; set "
@@ -93,10 +79,10 @@ REFUSED = [
     ),
     ({**CLOSED, "diodes": "none", "connectivity": 4}, "diodes is 'none'; closed = true needs 'col2row' or 'row2col'"),
     # its mask
-    ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
     ({"mask": [3]}, "mask holds 3; it must hold [row, column] pairs"),
-    ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
+    ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
     ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
+    ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
     # scan and debounce
     ({"diodes": "both"}, "diodes is 'both'; it must be one of 'col2row', 'row2col', 'none'"),
@@ -118,17 +104,12 @@ REFUSED = [
         "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be known",
     ),
     (
-        {"scan": "spiral"},
-        "scan is 'spiral'; it must be one of 'raster', 'reversal', or 'module:attribute' of your own",
-    ),
-    (
         {"scan": "adaptive"},
         "scan is 'adaptive', which no longer exists; use 'reversal' with precharge_us if the pins can drive and read "
         "both rows and columns, otherwise 'raster'",
     ),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
-    ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
         "settle_us + release_us is 18 clocks; 16 columns and 64 zones per frame need 22 clocks (1.83333 us) with "
@@ -140,18 +121,8 @@ REFUSED = [
         "labeller = 'serial'",
     ),
     (
-        {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
-        "settle_us + release_us is 48 clocks; 24 columns and 1 zones per frame need 51 clocks (4.25 us) with "
-        "labeller = 'serial'",
-    ),
-    (
         {"labeller": "fast"},
         "labeller is 'fast'; it must be one of 'run', 'serial', 'projection', 'single', "
-        "or 'module:attribute' of your own",
-    ),
-    (
-        {"debounce": "fast"},
-        "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk', "
         "or 'module:attribute' of your own",
     ),
     (
@@ -164,11 +135,8 @@ REFUSED = [
     ),
     # extents
     ({"extent": 1}, "extent is 1; it must be true or false"),
+    ({"extent": True, "labeller": "single"}, "labeller is 'single'; extent = true needs labeller = 'run' or 'serial'"),
     ({"extent": True, "report": "cells"}, "report is 'cells'; extent = true needs report = 'moments' or 'barycenter'"),
-    *(
-        ({"extent": True, "labeller": name}, f"labeller is '{name}'; extent = true needs labeller = 'run' or 'serial'")
-        for name in ("projection", "single")
-    ),
     # precharge and line reversal
     (
         {"precharge_us": 0.25, "column_read": "74hc165"},
@@ -183,33 +151,18 @@ REFUSED = [
     ({"project_us": 2.0}, "project_us is 2.0; leave it out, or set scan = 'reversal'"),
     ({"scan": "reversal"}, "precharge_us is 0; scan = 'reversal' drives the columns, and needs a time for it"),
     ({**REVERSAL, "project_us": 0}, "project_us is 0.0; it must be at least one clock, 0.0833333 us"),
-    ({**REVERSAL, "project_us": 10_001}, "project_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {**REVERSAL, "row_drive": "74hc595"},
         "row_drive is '74hc595'; scan = 'reversal' needs row_drive = 'direct', as it reads the rows",
     ),
     (
-        {**REVERSAL, "column_read": "74hc165"},
-        "column_read is '74hc165'; precharge_us drives the columns and needs 'direct'",
-    ),
-    (
-        {**REVERSAL, "diodes": "none", "report": "cells"},
-        "diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'",
-    ),
-    (
         {**REVERSAL, "send": "on_change", "keep_alive_ms": 3.0},
         "keep_alive_ms is 3.0; scan = 'reversal' needs at least 3.072 ms for this sheet",
     ),
-    (
-        {**REVERSAL, "send": "on_change", "keep_alive_ms": 15.3, "rows": 64, "settle_us": 100},
-        "keep_alive_ms is 15.3; scan = 'reversal' needs at least 15.36 ms for this sheet",
-    ),
     # report and link
     ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'barycenter', 'cells'"),
-    ({"report": "barycenter", "barycenter_bits": -1}, "barycenter_bits is -1; it must lie between 0 and 8"),
     ({"report": "barycenter", "barycenter_bits": 9}, "barycenter_bits is 9; it must lie between 0 and 8"),
     ({"barycenter_bits": 3}, "barycenter_bits is 3; leave it out, or set report = 'barycenter'"),
-    ({"report": "cells", "barycenter_bits": 5}, "barycenter_bits is 5; leave it out, or set report = 'barycenter'"),
     (
         {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 256},
         "settle_us + release_us is 72 clocks; 32 columns and 256 zones per frame need 90 clocks (7.5 us) "
@@ -218,14 +171,11 @@ REFUSED = [
     ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),
     ({"send": "on_change", "keep_alive_ms": 101}, "keep_alive_ms is 101.0; it must lie between 0.0 and 100.0 ms"),
     ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes 0.096 ms"),
-    ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
     # shift registers
     ({"row_drive": "74hc164"}, "row_drive is '74hc164'; it must be one of 'direct', '74hc595'"),
     ({"column_read": "spi"}, "column_read is 'spi'; it must be one of 'direct', '74hc165'"),
     ({"row_chains": 2}, "row_chains is 2; leave it out, or set row_drive = '74hc595'"),
-    ({"column_chains": 0}, "column_chains is 0; leave it out, or set column_read = '74hc165'"),
-    ({"row_drive": "74hc595", "row_chains": 0}, "row_chains is 0; it must lie between 1 and 16"),
     ({"column_read": "74hc165", "column_chains": 17}, "column_chains is 17; it must lie between 1 and 16"),
     (
         {"columns": 9, "column_read": "74hc165", "column_chains": 4},
@@ -235,13 +185,11 @@ REFUSED = [
         {"shift_hz": 4_000_000},
         "shift_hz is 4000000; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'",
     ),
-    ({"row_drive": "74hc595", "shift_hz": 9_999}, "shift_hz is 9999; it must lie between 10000 and 50000000 Hz"),
     # clock and line
-    ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 401_000_000}, "clock_hz is 401000000; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"baud": 7_000_000}, "baud is 7000000; it must lie between 1200 and 6000000 for this clock"),
-    ({"baud": 300}, "baud is 300; it must lie between 1200 and 6000000 for this clock"),
     (
         {"baud": 5_000_000},
         "baud is 5000000: a clock of 12000000 Hz misses it by +20.00 %, the limit is 1.5 %; nearest good rates: "

@@ -1,4 +1,4 @@
-"""Forces in the view: the mouse's finger presses simulated units, and its force is drawn where it presses."""
+"""Forces in the view are drawn where they press."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tracker_frames import frame
 
-from contactfpga.robot.haptics import Contacts, LoadCells, Wrench, contacts
+from contactfpga.robot.haptics import LoadCells, Wrench, contacts
 from contactfpga.surfaces import CylinderSurface, PlaneSurface
 from contactfpga.tools.view import picture
 
@@ -37,22 +37,6 @@ def test_what_is_not_known_has_no_arrow():
     cells, zones = LoadCells.load(FLAT), frame(0, [(6, 4), (12, 12)])
     unknown = [SimpleNamespace(force_n=None), SimpleNamespace(force_n=(0.0, 0.0, -0.001))]
     assert picture.pushes(unknown, zones, cells, PlaneSurface()).shape == (0, 2, 3)
-
-
-@pytest.mark.campaign  # a board with units takes a while to compile
-def test_the_mouses_force_is_felt():
-    pytest.importorskip("viser")
-    from contactfpga.tools.view import opening
-
-    source, hand = opening._source(opening.ViewRequest(f"sim://?scene=nothing&skin={EXAMPLES}/force.toml&units={FLAT}"))
-    try:
-        hand.resize(force_n=8.0)
-        hand.click(50, 60)
-        found = [moment.felt[0] for _ in range(20) if (moment := source.poll()) and moment.felt and moment.felt[0]]
-    finally:
-        source.close()
-    assert isinstance(found[-1], Contacts)
-    assert found[-1][0].normal_n == pytest.approx(8.0, abs=0.5)
 
 
 def test_the_shape_of_contacts_is_that_of_zones():

@@ -15,7 +15,7 @@ from contactfpga.robot.body import robot_texts
 from contactfpga.tools import cli
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.panel import as_markdown
-from contactfpga_sim.lab.view import browser
+from contactfpga_sim.lab import browser
 
 SCRIPT = "parent.document.title = parent.hostile = 'ran'"
 HOSTILE = [

@@ -8,18 +8,17 @@ pytest.importorskip("viser")
 pytest.importorskip("websockets")
 pytest.importorskip("amaranth")
 
-from fake_board import wait_until
 from view_page import Page, camera, click, drag
 
 import contactfpga
 from contactfpga.tools.view import opening
 
-CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circles"
+CELLS, BARYCENTERS = "/sheet/cells", "/sheet/barycenters"
 
 
 @pytest.fixture(scope="module")
 def shown():
-    from contactfpga_sim.lab.view.browser import running
+    from contactfpga_sim.lab.browser import running
 
     with opening.opened(opening.ViewRequest("sim://?scene=nothing"), http_port=0) as shown, running(shown):
         yield shown
@@ -94,22 +93,6 @@ def test_the_panel_says_how_it_goes(page):
     facts = str(page.hear(lambda message: "**latency**" in str(message)))
     assert "**lost** nothing" in facts
     assert "frames per second" in facts
-
-
-@pytest.mark.slow  # the example is a large board to compile
-def test_a_sheet_of_several_is_shown():
-    """With its own latency; the mouse does not reach it."""
-    file = contactfpga.examples() / "two-sheets.toml"
-    source, hand = opening._source(opening.ViewRequest(f"sim://?scene=palm&sheets={file}#1", timeout=60))
-    seen = []
-    try:
-        wait_until(lambda: seen.append(source.poll()) or seen[-1])
-        (zone,) = seen[-1].zones
-        assert (source.sheet.rows, hand, zone.area_cells > 20) == (12, None, True)
-        late_us = float(dict(source.facts())["latency"].split()[0].replace(",", ""))
-        assert late_us < 100_000, "on the board's clock, not on this computer's"
-    finally:
-        source.close()
 
 
 def test_a_virtual_board_of_a_skin_is_no_robot():

@@ -11,7 +11,7 @@ pytest.importorskip("playwright")
 pytest.importorskip("amaranth")
 
 from contactfpga.tools.view import opening
-from contactfpga_sim.lab.view import browser
+from contactfpga_sim.lab import browser
 
 pytestmark = [
     pytest.mark.slow,  # about a minute and a half: the browser draws with the processor

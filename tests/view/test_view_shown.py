@@ -15,7 +15,7 @@ from tracker_frames import frame, moments
 from contactfpga import Skin
 from contactfpga.tools.view import cameras, chart, contacts, glow, limb, page, panel, picture, ruler
 from contactfpga.tools.view.cameras import Side, fitted
-from contactfpga.tools.view.sources import BoardSource, Moment, Strip, paced
+from contactfpga.tools.view.sources import Moment, Strip, paced
 from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
 
@@ -168,18 +168,6 @@ def test_a_picture_takes_any_text(line):
 )
 def test_how_often_frames_come_is_said_in_words(frames_per_s, says):
     assert paced(frames_per_s) == says
-
-
-def test_a_simulated_board_says_its_speed_only_where_it_lags(board):
-    import contactfpga
-
-    with contactfpga.open(board.path, timeout=60.0) as port:
-        source = BoardSource(port, "board")
-        assert dict(source.facts())["lost"] == "nothing"
-        source._pace = SimpleNamespace(share=1.0)
-        assert "simulated" not in dict(source.facts())
-        source._pace = SimpleNamespace(share=0.4)
-        assert dict(source.facts())["simulated"].startswith("at 40% of real time")
 
 
 def test_the_panel_names_no_color_twice():

@@ -1,7 +1,6 @@
 """The cache of compiled gateware: what others could have written is not loaded."""
 
 import os
-import random
 import signal
 import stat
 import subprocess
@@ -136,12 +135,6 @@ def test_links_are_not_followed(tmp_path):
     assert target.read_text() == "x"
 
 
-def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(CacheError, match=r"cannot be used: .*; name another folder with CONTACTFPGA_CACHE"):
-        cache.ready(tmp_path / "file" / "cache")
-
-
 def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
     code = (
         "import sys, time; from pathlib import Path; from contactfpga_sim.model.board import cache\n"
@@ -188,20 +181,11 @@ def answer(folder):
     return done.returncode, done.stdout.split(), done.stderr
 
 
-def damages():
-    yield "emptied", lambda data: b""
-    yield from ((f"cut to {size}", lambda data, size=size: data[:size]) for size in (63, 3000))
-    yield "cut by a byte", lambda data: data[:-1]
-    yield "longer", lambda data: data + b"\0"
-    rng = random.Random(5)
-    for share in (0.0, rng.random(), 0.9999):
-        bit = 1 << rng.randrange(8)
-
-        def flipped(data, share=share, bit=bit):
-            at = int(share * len(data))
-            return data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
-
-        yield f"flipped at {share:.2f}", flipped
+DAMAGES = {
+    "emptied": lambda data: b"",
+    "cut by a byte": lambda data: data[:-1],
+    "flipped in the middle": lambda data: data[:5000] + bytes([data[5000] ^ 4]) + data[5001:],
+}
 
 
 def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
@@ -209,7 +193,7 @@ def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
     assert answer(tmp_path) == (0, ["42"], "")
     (library,) = tmp_path.glob("*.so")
     good = library.read_bytes()
-    for what, damaged in damages():
+    for what, damaged in DAMAGES.items():
         library.write_bytes(damaged(good))
         warning = f"contactfpga: {library} in the cache is damaged; it is made again\n"
         assert answer(tmp_path) == (0, ["built", "42"], warning), what
@@ -243,21 +227,3 @@ def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
         assert result_cache.cached("kind", "key", lambda: [1, 22]) == [1, 22]
         assert capsys.readouterr().err == f"contactfpga: {path} in the cache is damaged; it is made again\n"
     assert result_cache.cached("kind", "key", lambda: 5) == [1, 22]
-
-
-@pytest.mark.campaign  # it compiles a board in a cache of its own
-def test_the_cache_may_be_the_current_folder(tmp_path):
-    code = (
-        "from contactfpga.skin import Skin; from contactfpga_sim.model.board.compiled import CompiledBoard\n"
-        "with CompiledBoard(Skin(rows=2, columns=2)) as board: board.run(10)"
-    )
-    environment = os.environ | {"CONTACTFPGA_CACHE": "."}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=200)
-    assert done.returncode == 0, done.stderr
-    (library,) = tmp_path.glob("*.so")
-    assert mode(library) == 0o600
-    library.chmod(0o777)
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=200)
-    assert done.returncode != 0
-    assert "can be written by others (mode 777)" in done.stderr

@@ -78,16 +78,6 @@ def test_scans_with_a_hello_are_left_out_of_the_plan():
     assert [frame for frame in plan.frame_of if frame is not None] == list(range(200_000))
 
 
-@pytest.mark.campaign
-def test_a_hello_in_the_middle_costs_no_frame():
-    frames = np.random.default_rng(3).random((120, 2, 3)) < 0.5
-    skin = replay.skin_for(2, 3, 8, 2)
-    repeated = frames[np.arange(60_000) % 120]
-    for index, result in enumerate(replay.replay(repeated, skin)):
-        assert result.frame.cells == frames[index % 120].sum()
-    assert index == 59_999
-
-
 @pytest.mark.slow
 def test_a_lost_frame_is_an_error(monkeypatch):
     frames = np.ones((300, 16, 16), bool)

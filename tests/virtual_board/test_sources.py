@@ -1,15 +1,12 @@
 """Keys of compiled boards and kept results: all that decides what they are, and nothing else."""
 
-import dis
 import os
 import shutil
 import subprocess
 import sys
-import types
 from pathlib import Path
 
 import pytest
-from sample import sample
 
 from contactfpga_sim.model.board import sources
 
@@ -207,36 +204,6 @@ def test_a_docstring_changes_no_kept_result(tmp_path, monkeypatch):
 
     assert key(text) == key(quiet) == key(louder)
     assert len({key(text), key(text.replace("3", "4")), key(text.replace('"""so"""', '"""no"""'))}) == 3
-
-
-def imports_of(code, package):
-    """Modules that compiled code imports, and those that attributes could be, as Python's own compiler has them."""
-    loaded = list(dis.get_instructions(code))
-    for at, one in enumerate(loaded):
-        if one.opname == "IMPORT_NAME":
-            constants = [each.argval for each in loaded[:at] if each.opname == "LOAD_CONST"]
-            level, names = constants[-2:]
-            above = package.split(".")[: len(package.split(".")) - level + 1] if level else []
-            name = ".".join((*above, *([one.argval] if one.argval else [])))
-            yield name
-            yield from (f"{name}.{each}" for each in names or () if each != "*")
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from imports_of(constant, package)
-
-
-@pytest.mark.parametrize("top", sample(PACKAGES, quick=["contactfpga_hdl"], slow=["contactfpga", "contactfpga_sim"]))
-def test_imports_are_those_that_python_compiles(top):
-    missing, root = {}, ROOT / PACKAGES[top]
-    for path in (root / top).rglob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        module = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
-        is_package = path.name == "__init__.py"
-        package = module if is_package else module.rpartition(".")[0]
-        code = compile(text.replace("if TYPE_CHECKING:", "if False:"), str(path), "exec")
-        missing[module] = set(imports_of(code, package)) - sources._imported(text, module, is_package)
-    assert len(missing) > 50
-    assert {name: left for name, left in missing.items() if left} == {}
 
 
 def test_files_of_ones_own_count_with_what_they_import_from_beside_them(tmp_path):

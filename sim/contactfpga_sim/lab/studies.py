@@ -14,8 +14,7 @@ _ALL = (
             "places kits set sheet defense",
             matters=Section("tables:matters_text"),
             speeds=Section("tables:speed_table"),
-            pushes=Section("tables:push_table", sample="tables:push_table"),
-            failures=Section("tables:failure_table"),
+            failures=Section("tables:failure_table", sample="tables:failure_table"),
         ),
         compute="tables:compute",
         pictures="tables:draw",
@@ -181,15 +180,6 @@ _ALL = (
         compute="tables:compute",
     ),
     Study(
-        "net",
-        title="Links over a network",
-        page="net.md",
-        minutes=1,
-        sections=tables("batch links thousand"),
-        pictures="tables:draw",
-        extra="test",
-    ),
-    Study(
         "order",
         title="Places by the order in which cells close",
         page="tracking.md",
@@ -313,17 +303,6 @@ _ALL = (
         page="units.md",
         minutes=0.1,
         sections=tables(units=Section("tables:units_table", sample="tables:units_table")),
-    ),
-    Study(
-        "view",
-        title="Delay and load of the view in a browser",
-        page="view.md",
-        minutes=1,
-        sections=tables(view_load=Section("tables:loads_table"), view_clicks=Section("tables:clicks_text")),
-        compute="tables:compute",
-        pictures="tables:draw",
-        needs=("chromium",),
-        extra="test",
     ),
 )
 STUDIES = {study.name: study for study in _ALL}

@@ -14,7 +14,6 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.parts import (
-    BEHAVIORS,
     ArmLink,
     Contacts,
     Control,
@@ -59,7 +58,6 @@ class Case:
     """Pads of foam below the sheet's board; None: the board is fixed to the arm."""
 
     def __post_init__(self) -> None:
-        _one_of("behavior", self.control.behavior, BEHAVIORS)
         _one_of("model", self.model, MODELS)
         _one_of("body", self.body, tuple(BODIES))
         if self.model == "point" and self.body != "rigid":

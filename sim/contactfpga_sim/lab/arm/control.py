@@ -19,9 +19,8 @@ class SensorReadings(NamedTuple):
 class Controller:
     """PI speed controller.
 
-    Behavior ``reverse``, the paper's: on contact, or torque at the limit, the arm goes back until the contact is
-    resolved, then slows to rest. ``comply``: the arm follows the torque like an inertia with damper and spring, but
-    goes back at the torque limit. A silent host stops the arm; in a contact it first retreats the full distance. If the
+    On contact, or torque at the limit, the arm goes back until the contact is resolved, then slows to rest, as in the
+    paper. A silent host stops the arm; in a contact it first retreats the full distance. If the
     contact persists it may be stale: only the torque limit causes another retreat until it was away once.
     """
 
@@ -34,7 +33,6 @@ class Controller:
         self._lever = case.link.lever_m
         self._most = case.motor.current_a
         self._wanted = case.link.speed_m_s / self._lever
-        self._home: float | None = None
         self._sum = 0.0
         self._touched_at = -float("inf")
         self._stale = False  # this contact was gone back from as far as it goes
@@ -59,8 +57,6 @@ class Controller:
         return self._old[0]
 
     def _decide(self, seconds: float, sensed: SensorReadings, contact: bool, over: bool, alive: bool) -> None:
-        comply = self._control.behavior == "comply" and self.state == "moving"
-        contact = contact and not comply
         if self.state != "reversing" and (over or contact):
             self._turn(seconds, sensed, "contact" if contact else "torque")
         elif self.state == "reversing":
@@ -68,8 +64,6 @@ class Controller:
         elif self.state == "moving" and not alive:
             self._wanted = 0.0
             self._now(seconds, "stopped", "silence")
-        elif comply:
-            self._yield(sensed)
         elif self.state == "slowing":
             slower = self._control.slowing_m_s2 * self._control.period_s / self._lever
             self._wanted = min(0.0, self._wanted + slower)
@@ -89,16 +83,6 @@ class Controller:
             self._now(seconds, "slowing", "retreat")
         elif by_contact and seconds > self._touched_at and seconds - self._touched_at >= self._control.clear_s - 1e-9:
             self._now(seconds, "slowing", "resolved")
-
-    def _yield(self, sensed: SensorReadings) -> None:
-        """Admittance: I d wanted/dt = -torque - damping wanted - stiffness (angle - home)."""
-        control = self._control
-        if self._home is None:
-            self._home = sensed.angle_rad
-        push = -sensed.torque_nm - control.virtual_stiffness * (sensed.angle_rad - self._home)
-        # Implicit in the damping, so that no period is too long for it.
-        gained = self._wanted + control.period_s * push / control.virtual_kgm2
-        self._wanted = gained / (1 + control.period_s * control.virtual_damping / control.virtual_kgm2)
 
     def _speed(self, sensed: SensorReadings) -> float:
         control = self._control

@@ -8,8 +8,6 @@ from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, not_n
 from contactfpga.design.cover.hertz import HalfSpace
 from contactfpga_sim.apps.latency.usb import HOST_S
 
-BEHAVIORS = ("reverse", "comply")
-
 
 class _Checked:
     """Fields are numbers in SI units: above 0, or, if ``_zero`` names them, 0 or above."""
@@ -38,7 +36,6 @@ class ArmLink(_Checked):
     lever_m: float
     """Distance from the joint to where speeds are measured, and to touches without their own lever."""
     speed_m_s: float
-    _zero = ("speed_m_s",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,15 +91,7 @@ class Control(_Checked):
     """Host silence that stops the arm."""
     delay_s: float = 0.0
     """Age of measurements if the loop runs over a link."""
-    behavior: str = "reverse"
-    """One of :data:`BEHAVIORS`."""
-    virtual_kgm2: float = 0.02
-    """Inertia of the admittance, for ``comply``."""
-    virtual_damping: float = 0.5
-    """Damping in Nm s/rad, for ``comply``."""
-    virtual_stiffness: float = 4.0
-    """Return spring in Nm/rad, for ``comply``."""
-    _zero = ("delay_s", "clear_s", "virtual_stiffness")
+    _zero = ("delay_s", "clear_s")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,7 +140,7 @@ class Contacts(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Touch(_Checked):
-    """A thing that the arm runs into, or that pushes it."""
+    """A thing that the arm runs into."""
 
     x_mm: float = 80.0
     """Place along the columns of the flat sheet; column 0 is at 0."""
@@ -164,24 +153,7 @@ class Touch(_Checked):
     """Mass of the yielding part; 0: rigid."""
     stiffness_n_m: float = 0.0
     damping_ns_m: float = 0.0
-    push_m_s: float = 0.0
-    """Speed toward the arm; 0: at rest."""
-    push_m: float = 0.0
-    hold_s: float = 0.0
-    """Time at the push's end before an equally fast return."""
-    _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m", "push_m_s", "push_m", "hold_s")
-
-    def pushed(self, seconds: float) -> tuple[float, float]:
-        """Distance and speed toward the arm."""
-        if seconds <= 0 or not self.push_m_s:
-            return 0.0, 0.0
-        takes = self.push_m / self.push_m_s
-        if seconds < takes:
-            return self.push_m_s * seconds, self.push_m_s
-        left = 2 * takes + self.hold_s - seconds
-        if left >= takes:
-            return self.push_m, 0.0
-        return (self.push_m_s * left, -self.push_m_s) if left > 0 else (0.0, 0.0)
+    _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m")
 
 
 @dataclasses.dataclass(frozen=True)

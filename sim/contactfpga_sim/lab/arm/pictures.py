@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,10 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm import sweep
-from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
@@ -107,22 +105,9 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
     )
 
 
-def check(case: Case) -> None:
-    """Raise :class:`CaseError` for a case without charts."""
-    if case.control.behavior != "reverse" or not case.link.speed_m_s:
-        raise CaseError(
-            f"behavior is {case.control.behavior!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
-        )
-
-
-def draw(
-    case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path, suffixes: Sequence[str] = ("png", "svg")
-) -> list[Path]:
+def draw(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint], folder: Path) -> Path:
     with matplotlib.rc_context(style.SETTINGS):
-        figures = {
-            "arm-force": _force(case, tasks, found),
-        }
-        return [style.save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
+        return style.save(_force(case, tasks, found), folder / "arm-force.svg")
 
 
 def _axes(x: str, y: str) -> tuple[Figure, Any]:
@@ -171,15 +156,3 @@ def _force(case: Case, tasks: Plan, found: dict[SweepTask, SweepPoint]) -> Figur
             line.set_label("_")
     figure.legend(loc="outside lower center", ncols=2)
     return figure
-
-
-def write_csv(found: dict[SweepTask, SweepPoint], path: Path) -> Path:
-    """Write a line per run, in SI units."""
-    names = [field.name for field in dataclasses.fields(SweepPoint)]
-    with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])
-        for task, point in found.items():
-            given = (task.latency_s, task.case.link.speed_m_s, task.case.control.torque_limit_nm)
-            table.writerow([task.way, *(f"{value:.6g}" for value in (*given, *dataclasses.astuple(point)))])
-    return path

@@ -57,11 +57,8 @@ class Plant:
         sunk, sinks = (0.0, 0.0) if self._bed is None else state[-2:]
         for touch, lever, place in self._touches:
             given, rate = (0.0, 0.0) if place is None else (state[place], state[place + 1])
-            came, coming = touch.pushed(seconds)
-            depth = lever * theta - touch.gap_m + came - given - sunk
-            force = max(
-                0.0, self._spring.force_n(depth) * (1 + self._damping * (lever * omega + coming - rate - sinks))
-            )
+            depth = lever * theta - touch.gap_m - given - sunk
+            force = max(0.0, self._spring.force_n(depth) * (1 + self._damping * (lever * omega - rate - sinks)))
             forces.append(force)
             depths.append(depth)
             torque += lever * (force if self._bed is None else self._bed.force_n(sunk, self._modulus_pa))

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.comply import Push
 from contactfpga_sim.lab.arm.run import ArmResponse, RunRecord, run
 
 UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
@@ -109,21 +108,6 @@ def as_json(found: dict[str, RunRecord], name: str) -> dict[str, Any]:
         known["deviation_from_paper"] = {row.field: deviation(row, first) for row in ROWS if row.paper is not None}
         known["notes"] = list(NOTES)
     return known
-
-
-PUSH_HEADINGS = ("push, m/s", "peak torque, Nm", "peak force, N", "indentation, mm", "yields, mm", "back, ms", "ends")
-
-
-def push_lines(pushes: list[Push]) -> list[list[str]]:
-    lines = [list(PUSH_HEADINGS)]
-    for push in pushes:
-        back = "-" if push.back_s is None else f"{1e3 * push.back_s:.0f}"
-        numbers = (push.peak_torque_nm, push.peak_force_n, 1e3 * push.peak_indentation_m)
-        ends = "torque limit" if push.stopped else "returns"
-        lines.append(
-            [f"{push.speed_m_s:.3f}", *(f"{value:.2f}" for value in numbers), f"{1e3 * push.yields_m:.1f}", back, ends]
-        )
-    return lines
 
 
 HALFWAY = {"x_mm": 85.0, "y_mm": 85.0}

@@ -52,14 +52,9 @@ def work(task: SweepTask) -> dict[str, float]:
     return result_cache.cached("arm", key, lambda: dataclasses.asdict(_point(task)))
 
 
-def sweep(
-    tasks: Sequence[SweepTask],
-    executor: Executor,
-    step: Callable[[str, int], None] = lambda name, of: None,
-    so_far: dict[SweepTask, SweepPoint] | None = None,
-) -> list[SweepPoint]:
-    """The tasks' points in order. Each enters ``so_far``, then ``step(name, number of all)`` is called."""
-    found = {} if so_far is None else so_far
+def sweep(tasks: Sequence[SweepTask], executor: Executor, step: Callable[[str, int], None]) -> list[SweepPoint]:
+    """The tasks' points in order. After each, ``step(name, number of all)`` is called."""
+    found: dict[SweepTask, SweepPoint] = {}
     futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
         found[futures[future]] = SweepPoint(**future.result())

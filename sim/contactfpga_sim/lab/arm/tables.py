@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga_sim.apps.pool import executor, progress
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.arm import anywhere, comply, kits, pictures, report, sweep
+from contactfpga_sim.lab.arm import anywhere, kits, pictures, report, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import RunRecord, run
 from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
@@ -49,8 +49,8 @@ def compute() -> ArmRuns:
 
 
 def draw(folder: Path, found: ArmRuns) -> list[Path]:
-    charts = pictures.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
-    return [*pictures.pictures(found.columns, folder, ("svg",)), *charts]
+    chart = pictures.draw(Case.load("paper"), found.plan, found.points, folder)
+    return [*pictures.pictures(found.columns, folder, ("svg",)), chart]
 
 
 class Failure(NamedTuple):
@@ -107,11 +107,6 @@ def failure_table() -> str:
         reacts = "never" if found.reacts_s is None else f"{1e3 * found.reacts_s:.2f}"
         lines.append([failure.name, reacts, found.reason, f"{found.peak_force_n:.1f}", str(found.reversals)])
     return writer.table_of(lines)
-
-
-def push_table() -> str:
-    """Pushes up to the fastest yielded to, and one faster."""
-    return writer.table_of(report.push_lines(comply.pushes(Case.load("push"))[1]))
 
 
 def defense_table() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga import terminal
@@ -11,12 +10,10 @@ from contactfpga.design.cover import BODIES, load_cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, outputs, results
-from contactfpga.tools.console.interrupt import Interruption
 
 if TYPE_CHECKING:
     from contactfpga_sim.lab.arm import anywhere
     from contactfpga_sim.lab.arm.case import Case
-    from contactfpga_sim.lab.arm.sweep import SweepPoint, SweepTask
 
 EXTRA = "sim"
 
@@ -24,7 +21,7 @@ PLACES = 60
 
 
 def add_flags(flag: flags.Flags) -> None:
-    flag("--case CASE", "Case to run: paper, paper-offset, push or a .toml file.", default="paper")
+    flag("--case CASE", "Case to run: paper, paper-offset or a .toml file.", default="paper")
     usual = "Latency from the switch to the controller (default: the paper's 6000)."
     flag("--latency-us US", usual, numbers.number(0, 1e7, "us"), 6000.0)
     places = "Touches anywhere on the sheet (default: 60; 0, and 0 for several touches: the case's place)."
@@ -33,7 +30,6 @@ def add_flags(flag: flags.Flags) -> None:
     bodies = f"What the arm runs into: {', '.join(BODIES)} (default: the case's)."
     flag("--body BODY", bodies, tuple(BODIES))
     flags.json(flag, "Print one JSON object in SI units, and draw nothing.")
-    flag("--charts", "Draw force against latency instead.")
     regions = "Table of body regions: print the speed and reaction time that keep their limits instead."
     flag("--regions FILE.toml", regions)
     force = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
@@ -52,13 +48,9 @@ def run(args: argparse.Namespace) -> int:
         case, args.case = case.but(body=args.body), f"{args.case} against {args.body}"
     if args.regions:
         return _regions(args, case)
-    if args.charts:
-        if args.json:
-            raise ContactFPGAError("--charts only writes files, which it names; leave --json out")
-        return _charts(args, case)
     if args.force_threshold:
         return _units(args, case)
-    return _pushes(args, case) if case.control.behavior == "comply" else _contact(args, case)
+    return _contact(args, case)
 
 
 def _contact(args: argparse.Namespace, case: Case) -> int:
@@ -102,9 +94,8 @@ def _units(args: argparse.Namespace, case: Case) -> int:
     from contactfpga.tools.console import tables
     from contactfpga_sim.lab.arm import report
 
-    if args.skin is not None or case.control.behavior == "comply":
-        what = "--force-threshold runs its own Skin, with a case that reverses"
-        raise ContactFPGAError(f"{what}; leave --skin and such a case out")
+    if args.skin is not None:
+        raise ContactFPGAError("--force-threshold runs its own Skin; leave --skin out")
     lines = report.defense_lines(case)
     if args.json:
         results.show(args, [dict(zip(lines[0], line)) for line in lines[1:]])
@@ -126,47 +117,3 @@ def _regions(args: argparse.Namespace, case: Case) -> int:
     title = f"Case {args.case}: {case.link.speed_m_s:g} m/s, reaction after {1e3 * late:g} ms"
     tables.show([REGION_HEADS, *map(region_row, found)], title=title)
     return 0
-
-
-def _pushes(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga.tools.console import tables
-    from contactfpga_sim.lab.arm import comply, report
-
-    fastest, pushes = comply.pushes(case)
-    if args.json:
-        known = {"case": args.case, "fastest_m_s": fastest, "pushes": pushes}
-        results.show(args, known)
-        return 0
-    title = f"Case {args.case}: pushed by {1e3 * case.touch[0].push_m:g} mm and let go"
-    tables.show(report.push_lines(pushes), title=title)
-    terminal.say(f"The torque stays below {case.control.torque_limit_nm:g} Nm up to a push of {fastest:.3f} m/s.")
-    return 0
-
-
-def _charts(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga_sim.apps.pool import executor, progress
-    from contactfpga_sim.lab.arm import pictures, sweep
-
-    pictures.check(case)
-    folder = outputs.folder(args.output)
-    tasks = pictures.plan(case)
-    so_far: dict[SweepTask, SweepPoint] = {}
-    try:
-        with executor(args.jobs, args.dask) as workers, progress() as step:
-            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
-    except KeyboardInterrupt:
-        raise Interruption(_kept(so_far, len(tasks.all), folder)) from None
-    print(pictures.write_csv(found, folder / "arm-charts.csv"), flush=True)
-    for path in pictures.draw(case, tasks, found, folder):
-        print(path)
-    return 0
-
-
-def _kept(found: dict[SweepTask, SweepPoint], of: int, folder: Path) -> str:
-    from contactfpga_sim.lab.arm import pictures
-
-    again = "run the same command again to go on from there"
-    if not found:
-        return f"interrupted before the first of {of} runs was finished; {again}"
-    path = pictures.write_csv(found, folder / "arm-charts-so-far.csv")
-    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"

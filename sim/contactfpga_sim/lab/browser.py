@@ -1,4 +1,4 @@
-"""The view in a headless browser."""
+"""The view in a headless browser, for tests."""
 
 from __future__ import annotations
 
@@ -20,40 +20,16 @@ NAMES = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 PATIENCE_S = 300.0
 
-WATCH = """
+BOX = """
 () => {
     const canvas = [...document.querySelectorAll('canvas')].sort((a, b) => b.width - a.width)[0];
-    const probe = document.createElement('canvas');
-    probe.width = probe.height = 9;
-    const context = probe.getContext('2d', {willReadFrequently: true});
-    const now = () => performance.timeOrigin + performance.now();
-    document.addEventListener('pointerup', () => { window.clicked_ms = now(); }, true);
     window.box = () => {
         const box = canvas.getBoundingClientRect();
         return [box.x, box.y, box.width, box.height];
     };
-    window.pixels = (x, y) => {
-        context.clearRect(0, 0, 9, 9);
-        context.drawImage(canvas, x * canvas.width - 4, y * canvas.height - 4, 9, 9, 0, 0, 9, 9);
-        return context.getImageData(0, 0, 9, 9).data;
-    };
-    window.watch = (x, y) => {
-        window.drawn_ms = window.clicked_ms = null;
-        const look = () => {
-            const data = window.pixels(x, y);
-            for (let i = 0; i < data.length; i += 4) {
-                if (data[i] > data[i + 1] + 60 && data[i] > data[i + 2] + 60) {
-                    window.drawn_ms = now();
-                    return;
-                }
-            }
-            requestAnimationFrame(look);
-        };
-        requestAnimationFrame(look);
-    };
 }
 """
-"""``watch(x, y)``: wait for a zone's barycenter, by its unique color, at that share of the canvas."""
+"""``box()``: the canvas' left, top, width and height."""
 
 OVER = "() => window.__viserMutable.canvas.style.cursor === 'pointer'"
 """Whether the page knows that the mouse is over something to be clicked."""
@@ -73,7 +49,7 @@ class Visitor:
             if time.monotonic() > until:
                 raise TimeoutError("the page never said where its camera is")
             page.wait_for_timeout(50)
-        page.evaluate(WATCH)
+        page.evaluate(BOX)
         page.wait_for_selector("text=Software WebGL rendering detected", state="detached")  # it covers cells at first
         page.wait_for_timeout(500)
 
@@ -97,9 +73,7 @@ class Visitor:
 
     def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
         """Drag from first to last place and hold; the button stays down."""
-        self._drag([self.place(*place) for place in places], hold_ms)
-
-    def _drag(self, shares: list[tuple[float, float]], hold_ms: int) -> None:
+        shares = [self.place(*place) for place in places]
         self._hover(lambda: shares[0])
         self.page.mouse.down()
         for one in shares[1:]:
@@ -119,23 +93,6 @@ class Visitor:
             if time.monotonic() > until:
                 raise TimeoutError("the page never knew that the mouse is over something to be clicked")
 
-    def choose(self, before: str, now: str) -> None:
-        """Choose in the panel's list that shows ``before``."""
-        lists = self.page.locator("input[aria-haspopup=listbox]")
-        number = [lists.nth(one).input_value() for one in range(lists.count())].index(before)
-        lists.nth(number).click()
-        self.page.get_by_role("option", name=now, exact=True).click()
-
-    def watch(self, x_mm: float, y_mm: float) -> None:
-        """Start waiting in the page for a barycenter there."""
-        self.page.evaluate("([x, y]) => window.watch(x, y)", list(self.place(x_mm, y_mm)))
-
-    def drawn_s(self, seconds: float = PATIENCE_S) -> tuple[float, float]:
-        """Times of mouse release and drawn barycenter, on ``time.time()``."""
-        self.page.wait_for_function("() => window.drawn_ms", timeout=seconds * 1e3)
-        clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
-        return clicked / 1e3, drawn / 1e3
-
     def _pixel(self, shares: tuple[float, float]) -> tuple[float, float]:
         left, top, width, height = self.page.evaluate("window.box()")
         return left + shares[0] * width, top + shares[1] * height
@@ -149,8 +106,8 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = False) -> Iterator[Visitor]:
-    """Open a view in a browser while a thread runs it; ``dark``: its user prefers dark pages."""
+def visit(shown: ServedView, width: int = 1100, height: int = 680) -> Iterator[Visitor]:
+    """Open a view in a browser while a thread runs it."""
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError as error:
@@ -161,8 +118,7 @@ def visit(shown: ServedView, width: int = 1100, height: int = 680, dark: bool = 
     with running(shown), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(SOFTWARE), timeout=1e3 * PATIENCE_S)
         try:
-            scheme: Any = "dark" if dark else "light"
-            page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+            page = browser.new_page(viewport={"width": width, "height": height})
             page.set_default_timeout(1e3 * PATIENCE_S)
             yield Visitor(page, shown)
         finally:

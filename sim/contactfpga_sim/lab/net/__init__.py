@@ -1,1 +1,0 @@
-"""Many boards through one Zenoh router, against a bare Zenoh pair."""

@@ -1,1 +1,0 @@
-"""Delay and load of the view in a browser."""
