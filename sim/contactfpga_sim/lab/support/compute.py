@@ -16,9 +16,9 @@ from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.apps import pool
 from contactfpga_sim.apps.covers import tiled
+from contactfpga_sim.lab.benchmark.pressed import Patches, patches
 from contactfpga_sim.lab.body.folding import frame_of
 from contactfpga_sim.lab.chart.methods import sheet
-from contactfpga_sim.lab.levels.pressed import Patches, patches
 from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.contacts import Contact, Shape
