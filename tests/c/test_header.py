@@ -526,3 +526,45 @@ def test_vectors_by_c_and_by_python(decoder):
         said = [line for line in lines if line and not line.startswith("> ")]
         assert by_c(decoder, data)[:-1] == said
         assert by_python(data)[:-1] == said
+
+
+FUZZ = r"""
+#include "contactfpga.h"
+static contactfpga_reader reader;
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    contactfpga_init(&reader);
+    for (size_t i = 0; i < size; i++) {
+        contactfpga_event event = contactfpga_push(&reader, data[i]);
+        for (unsigned what = 0; event == CONTACTFPGA_HELLO && what < 8; what++) {
+            uint32_t value;
+            contactfpga_unit_value(&reader.hello, (uint8_t)what, 0, UINT32_MAX, &value);
+        }
+        if (event != CONTACTFPGA_FRAME) continue;
+        contactfpga_zone zone;
+        for (uint16_t n = 0; contactfpga_zone_at(&reader, n, &zone); n++)
+            if (!zone.area && !(reader.frame.flags & CONTACTFPGA_MISMATCH)) __builtin_trap();
+        for (unsigned row = 0; row < 256; row++) contactfpga_pressed(&reader, (uint8_t)row, (uint8_t)(row * 7));
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.campaign
+def test_a_minute_of_coverage_guided_bytes(tmp_path):
+    """Sanitizers stop at the first access outside the reader, and a trap at a zone without cells."""
+    if not shutil.which("clang"):
+        pytest.skip("clang is not installed")
+    (tmp_path / "fuzz.c").write_text(FUZZ)
+    command = ["clang", "-g", "-O1", "-fsanitize=fuzzer,address,undefined", f"-I{FOLDER}", "-o", tmp_path / "fuzz"]
+    built = subprocess.run([*command, tmp_path / "fuzz.c"], capture_output=True, text=True, timeout=250, check=False)
+    if "libclang_rt.fuzzer" in built.stderr:
+        pytest.skip("clang has no libFuzzer")
+    assert built.returncode == 0, built.stderr
+    seeds = tmp_path / "seeds"
+    seeds.mkdir()
+    for seed in range(20):
+        (seeds / str(seed)).write_bytes(History(seed).stream(30))
+    run = [tmp_path / "fuzz", "-max_total_time=60", "-max_len=20000", seeds]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=180, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]

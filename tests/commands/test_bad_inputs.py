@@ -385,3 +385,30 @@ def test_a_case_that_is_like_itself_is_refused(tmp_path, run):
     path = tmp_path / "case.toml"
     path.write_text(f"like = {str(path)!r}")
     assert "it must name another case" in refused(*run("study", "arm", "--case", str(path)))
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.usefixtures("no_work")
+@pytest.mark.parametrize("suffix", ["npy", "npz", "bin"])
+@by_chance
+@given(data=st.data())
+def test_random_bytes_in_files_never_end_in_a_traceback(suffix, data, run, files):
+    path = files["NONE"].parent / f"random.{suffix}"
+    frames = np.zeros((4, 4, 4), bool)
+    if suffix == "npy":
+        np.save(path, frames)
+    elif suffix == "npz":
+        np.savez(path, pressed=frames, rate_hz=50.0)
+    else:
+        path.write_bytes(files["RECORDED"].read_bytes())
+    raw = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        raw[data.draw(st.integers(0, len(raw) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(raw[: data.draw(st.integers(0, len(raw)))] if data.draw(st.booleans()) else raw)
+    commands = [["zones", "--json", f"replay://{path}"]]
+    if suffix != "bin":
+        commands = [["replay", str(path)], ["fit", str(path)], ["zones", "--json", f"sim://?scene={path}"]]
+    for command in commands:
+        status, errors = run(*command)
+        if status != 0:
+            refused(status, errors)

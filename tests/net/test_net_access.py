@@ -27,6 +27,15 @@ LONG = 60.0
 
 PAGE = (Path(__file__).parents[2] / "docs" / "net.md").read_text(encoding="utf-8")
 AUTHORITY, CERTIFICATE = re.findall(r"^    (openssl .*)$", PAGE, re.MULTILINE)
+NAMES = "-addext basicConstraints=CA:FALSE -addext subjectAltName=DNS:localhost,IP:127.0.0.1"
+ASKED = (
+    f"openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=localhost {NAMES} "
+    "-keyout old-key.pem -out old.csr"
+)
+EXPIRED = (
+    "openssl x509 -req -in old.csr -CA authority.pem -CAkey authority-key.pem -CAcreateserial -copy_extensions copy "
+    "-days -1 -out old.pem"
+)
 
 
 class Keys:
@@ -49,7 +58,7 @@ class Keys:
             assert before in text
             text = text.replace(before, after)
         text = text.replace("tls/localhost:7447", endpoint or self.endpoint)
-        for file in ("key.pem", "certificate.pem", "authority.pem", "other.pem", "users.txt"):
+        for file in ("key.pem", "old-key.pem", "certificate.pem", "old.pem", "authority.pem", "other.pem", "users.txt"):
             text = text.replace(f'"{file}"', f'"{self.folder}/{file}"')
         self._count += 1
         path = self.folder / f"{name}-{self._count}.json5"
@@ -104,6 +113,25 @@ def test_certificates_and_users_as_in_the_example(keys, monkeypatch):
         monkeypatch.setattr(session, "CONNECT_MS", 60_000)
         with pytest.raises(contactfpga.PortNotFound, match=r"nobody publishes it.*do its access rules let this user"):
             contactfpga.open(keys.port(('"robot"', '"visitor"'), ("a long password", "a ticket")))
+
+
+def test_an_expired_certificate_and_files_that_are_not_there(keys, monkeypatch):
+    keys.make(ASKED, EXPIRED)
+    monkeypatch.setattr(session, "CONNECT_MS", 600)
+    old = (('"certificate.pem"', '"old.pem"'), ('"key.pem"', '"old-key.pem"'))
+    with session.listening(config=keys.config("publish", *old)):
+        with pytest.raises(
+            contactfpga.PortNotFound, match=r"are certificates, user and password those that it asks for"
+        ):
+            contactfpga.open(keys.port())
+    for name, file, setting, opened in (
+        ("publish", "key.pem", "transport/link/tls/listen_private_key", session.listening),
+        ("publish", "users.txt", "transport/auth/usrpwd/dictionary_file", session.listening),
+        ("read", "authority.pem", "transport/link/tls/root_ca_certificate", session.connected),
+    ):
+        config = keys.config(name, (f'"{file}"', '"nowhere"'))
+        with pytest.raises(contactfpga.ContactFPGAError, match=rf"{setting} is 'nowhere'; there is no such file$"):
+            opened(config=config)
 
 
 def test_who_may_read_but_not_ask_is_told(keys):
