@@ -7,9 +7,11 @@ from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import of_columns
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row, moves_sample, scan_ports
 from contactfpga_hdl.scan.stuck import Stuck, present
+from contactfpga_hdl.util.bits import popcount
 from contactfpga_hdl.util.upset import upset
 
 
@@ -38,13 +40,14 @@ class _Sample:
         self.begins = Signal()  # the next one, of a row
         self.early: Value = Const(0)  # before the settle time is over
         self.moved: Any = None  # the sample's clock, where a command or the ruler moves it
+        self.harder: list[Any] = []  # with levels, the clocks of all but the lightest one's
         skin = derived.skin
         self.of_driven = Signal()  # high for a clock: it is there, and was taken while a row was driven
         self.of_row = Signal()  # and this is one of the sheet's rows
         self.of_released = Signal()  # likewise while no row was driven
         self.row = Signal(range(max(2, skin.row_lines)), init=first_row(skin))  # the next to be sampled
         self.read = Signal(skin.column_lines)  # columns that read pressed
-        self.pressed = Signal(skin.columns)  # and are not masked in this row
+        self.pressed = Signal(skin.columns * derived.level_bits)  # and are not masked in this row, or their levels
         self.is_first = self.row == 0
         self.is_last = Signal()  # as the slot says, so that a row's number that is wrong is so for one scan at most
         self.is_guard = self.row == skin.rows if skin.guard else Const(0)
@@ -99,12 +102,13 @@ class Scanner(wiring.Component):
         levels = self._sample_columns(m, slots, reader, sample)
         m.d.comb += [
             sample.read.eq(~levels if skin.selects_low else levels),
-            sample.pressed.eq(sample.read),
         ]
+        cells = self._levels(m, slots, reader, sample) if skin.levels > 1 else sample.read
+        m.d.comb += sample.pressed.eq(cells)
         with m.Switch(sample.row):
             for row in sorted({row for row, _ in skin.mask}):
                 with m.Case(row):
-                    m.d.comb += sample.pressed.eq(sample.read & present(skin, row))
+                    m.d.comb += sample.pressed.eq(cells & of_columns(self.derived, present(skin, row)))
         # Rows
         with m.If(sample.of_row):
             m.d.sync += [
@@ -133,7 +137,8 @@ class Scanner(wiring.Component):
             live = ~reader.levels if skin.selects_low else reader.levels
             begun, clock_of = slots.following[0] & (slots.clock == 0), slots.clock
             under_way = sample.is_guard & (clock_of >= 2) & (clock_of <= self.derived.settle_clocks + 1)
-            sample.moved.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
+            for ruler in (sample.moved, *sample.harder):
+                ruler.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
         # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),
@@ -209,6 +214,24 @@ class Scanner(wiring.Component):
         with m.If(reader.done):
             m.d.sync += kept.eq(reader.levels)
         return Mux(reader.done, reader.levels, kept)
+
+    def _levels(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
+        """The level of each column: in how many samples it read pressed. Those of harder levels come on their own."""
+        from contactfpga_hdl.scan.ruler import Ruler
+
+        skin, read = self.skin, [sample.read[: self.skin.columns]]
+        for level in range(1, skin.levels):
+            ruler = Ruler(m, self.derived, self.moves, self.clocks, slots.begins_rows, level)
+            sample.harder.append(ruler)
+            now, kept = (Signal(skin.columns, name=f"{name}_{level}") for name in ("level_now", "level_kept"))
+            live = reader.levels[: skin.columns]
+            with m.If(slots.clock == ruler.clock + 1):  # two synchronizer stages after the sample
+                m.d.comb += now.eq(~live if skin.selects_low else live)
+            with m.Else():
+                m.d.comb += now.eq(kept)
+            m.d.sync += kept.eq(now)
+            read.append(now)
+        return Cat(popcount(columns)[: self.derived.level_bits] for columns in zip(*read))
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """Drive columns while no row is driven, except for a clock at either end."""

@@ -133,8 +133,21 @@ def _check_guard(skin: Skin) -> None:
     _within(skin, "ruler")
     if skin.ruler and not (skin.guard and skin.precharge_us and skin.scan == "raster"):
         raise SkinError(f"ruler is {skin.ruler}; columns that fall need guard = true, precharge_us and scan = 'raster'")
+    _check_levels(skin)
     if skin.self_test and not skin.reads_rows:
         raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
+
+
+def _check_levels(skin: Skin) -> None:
+    _within(skin, "levels")
+    if skin.levels == 1:
+        return
+    if skin.ruler < (least := 1 << 2 * (skin.levels - 1)):
+        raise SkinError(f"ruler is {skin.ruler}; levels = {skin.levels} needs at least {least}")
+    for name, value in {"report": "cells", "debounce": "none", "closed": False}.items():
+        if getattr(skin, name) != value:
+            found, needed = (repr(one).lower() for one in (getattr(skin, name), value))
+            raise SkinError(f"{name} is {found}; levels = {skin.levels} needs {name} = {needed}")
 
 
 def _check_mask(skin: Skin) -> Mask:

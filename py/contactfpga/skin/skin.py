@@ -24,7 +24,7 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shell_words, shown, suggestion
 from contactfpga.skin import checks
 from contactfpga.skin.derived import MAX_RULER, Derived
-from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
+from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LEVELS, MAX_LINES, Sheet, max_zones
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,6 +65,10 @@ class Skin:
     ruler: int = field(default=0, metadata={"limits": (0, MAX_RULER, "")})
     """Instant at which rows are sampled, in sixteenths of the time in which the columns fall through known resistors at
     the guard crossings (docs/cell.md); 0: there are switches, and rows are sampled at the end of ``settle_us``."""
+    levels: int = field(default=1, metadata={"limits": (1, MAX_LEVELS, "")})
+    """Levels of force of each cell with a ruler (docs/levels.md): rows are sampled so many times, the lightest level at
+    ``ruler`` and each next one after a quarter of that time. A fourth level would need a third bit and count no better.
+    """
     row_order: tuple[int, ...] = ()
     """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()
@@ -112,7 +116,7 @@ class Skin:
     """
     report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: a bitmap
-    of the pressed cells.
+    of the pressed cells, or a map of their levels.
     """
     barycenter_bits: int = field(default=4, metadata={"limits": (0, MAX_BARYCENTER_BITS, "")})
     """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
