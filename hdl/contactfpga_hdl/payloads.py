@@ -10,7 +10,8 @@ from contactfpga.wire.framing import DIGIT_BITS
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: a bit per column, or its level, whether the row is the frame's last, and its number if the scan skips rows."""
+    """A sampled row: a bit per column, or its level; whether the row is the frame's last; and its number if the scan
+    skips rows."""
     number = {"y": row_bits(derived)} if derived.skips else {}
     return data.StructLayout({"cells": derived.skin.columns * derived.level_bits, "last": 1, **number})
 
