@@ -44,7 +44,7 @@ SKINS = [
     Skin(rows=6, columns=7, extent=True),
     Skin(rows=5, columns=8, extent=True, report="barycenter", barycenter_bits=2, connectivity=4),
     Skin(rows=7, columns=5, extent=True, surface="cylinder", radius_mm=9.0, closed=True),
-    Skin(rows=4, columns=7, report="cells", levels=2, ruler=9, guard=True, precharge_us=1.0, settle_us=40.0),
+    Skin(rows=4, columns=7, report="cells", ruler=9, harder=(2,), guard=True, precharge_us=1.0, settle_us=40.0),
 ]
 
 
@@ -360,7 +360,7 @@ CHANGES = {
     Skin(clock_hz=24_000_000): [{"pitch_x_mm": 9.0}, {"pitch_y_mm": 9.0}, {"surface": "cylinder", "radius_mm": 99.0}],
     Skin(report="barycenter", barycenter_bits=3): [{"barycenter_bits": 4}],
     Skin(report="cells"): [{"diodes": "none"}],
-    Skin(report="cells", levels=2, ruler=16, guard=True, precharge_us=1.0): [{"levels": 3}],
+    Skin(report="cells", ruler=16, harder=(4,), guard=True, precharge_us=1.0): [{"harder": (4, 1)}],
     ROUND: [{"radius_mm": 8.0}, {}],  # with {} its ends do not meet, which no Skin of this pitch allows
 }
 

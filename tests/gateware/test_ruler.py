@@ -22,13 +22,13 @@ SKINS = {
     "zones": Skin(rows=3, columns=4, ruler=32, settle_us=24, **TINY),
     "cells, masked": Skin(rows=2, columns=3, ruler=20, report="cells", mask=((0, 1), (1, 1)), settle_us=20, **TINY),
     "one row, mirrored": Skin(rows=1, columns=2, ruler=8, diodes="row2col", fail_safe=True, settle_us=30, **TINY),
-    "levels": Skin(rows=3, columns=5, ruler=60, levels=3, report="cells", mask=((0, 1), (2, 4)), settle_us=24, **TINY),
-    "two levels, mirrored": Skin(rows=2, columns=3, ruler=24, levels=2, report="cells", diodes="row2col", settle_us=24,
+    "levels": Skin(rows=3, columns=5, ruler=60, harder=(15, 3), report="cells", mask=((0, 1), (2, 4)), settle_us=24, **TINY),
+    "two levels, mirrored": Skin(rows=2, columns=3, ruler=24, harder=(6,), report="cells", diodes="row2col", settle_us=24,
                                  row_drive="74hc595", dual=True, fail_safe=True, alive=True, **TINY),
-    "levels on change": Skin(rows=2, columns=2, ruler=30, levels=3, report="cells", send="on_change", keep_alive_ms=0.6,
+    "levels on change": Skin(rows=2, columns=2, ruler=30, harder=(12, 2), report="cells", send="on_change", keep_alive_ms=0.6,
                              row_order=(1, 0), column_order=(1, 0), units=1, settle_us=26, **TINY),
     "shift registers": Skin(rows=4, columns=2, ruler=20, row_drive="74hc595", alive=True, settle_us=30, **TINY),
-}  # fmt: skip
+}
 
 
 def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:

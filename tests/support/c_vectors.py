@@ -28,7 +28,7 @@ SKINS = {
     "extents": Skin(rows=5, columns=9, extent=True),
     "extents around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=9.0, closed=True, extent=True),
     "levels of force": Skin(
-        rows=4, columns=11, report="cells", levels=3, ruler=40, guard=True, precharge_us=1.0, settle_us=40.0
+        rows=4, columns=11, report="cells", ruler=40, harder=(10, 2), guard=True, precharge_us=1.0, settle_us=40.0
     ),
 }
 

@@ -104,7 +104,7 @@ def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
 LEVELS = {"report": "cells", "guard": True, "precharge_us": 1.0, "ruler": 16}
 
 
-@given(st.data(), skins(report="cells") | skins(levels=2, **LEVELS) | skins(levels=3, **LEVELS), TRAILERS)
+@given(st.data(), skins(report="cells") | skins(harder=(4,), **LEVELS) | skins(harder=(4, 1), **LEVELS), TRAILERS)
 @settings(max_examples=100, deadline=None)
 def test_bitmaps_and_maps_arrive_exactly(data, skin, trailer):
     seed = data.draw(st.integers(0, 1 << 32))
@@ -125,7 +125,7 @@ NAMES = st.text(max_size=8).filter(lambda name: name.isprintable() and name == n
     skins()
     | skins(report="barycenter", barycenter_bits=0)
     | skins(report="cells", diodes="none")
-    | skins(levels=3, **LEVELS),
+    | skins(harder=(4, 1), **LEVELS),
     st.sampled_from(["always", "on_change"]),
     st.floats(0.01, 1000.0),
     NAMES,

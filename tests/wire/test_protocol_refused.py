@@ -42,7 +42,7 @@ def refusal(plain, skin=REFERENCE):
 WIRE = Wire(REFERENCE)
 SMALL = Skin(rows=3, columns=5, **SLOW)  # its records and bitmap rows have bits to spare
 BITMAP = SMALL.replace(report="cells")
-MAP = BITMAP.replace(levels=2, ruler=9, guard=True, precharge_us=1.0)
+MAP = BITMAP.replace(ruler=9, harder=(2,), guard=True, precharge_us=1.0)
 DIVIDED = SMALL.replace(report="barycenter", barycenter_bits=1)  # area 4, x 4, y 3 bits
 FULL = REFERENCE.replace(zone_capacity=2)
 ONE = [(4, 10, 6)]

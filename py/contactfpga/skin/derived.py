@@ -240,7 +240,7 @@ class Derived(Widths):
     @property
     def rulers(self) -> tuple[int, ...]:
         """Instants of a row's samples in sixteenths of the ruler's time, the lightest level's first."""
-        return tuple(self.skin.ruler >> 2 * level for level in range(self.skin.levels))
+        return self.skin.ruler, *self.skin.harder
 
     @property
     def release_clocks(self) -> int:

@@ -24,7 +24,7 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shell_words, shown, suggestion
 from contactfpga.skin import checks
 from contactfpga.skin.derived import MAX_RULER, Derived
-from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LEVELS, MAX_LINES, Sheet, max_zones
+from contactfpga.skin.sheet import MAX_BARYCENTER_BITS, MAX_LINES, Sheet, max_zones
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,10 +65,9 @@ class Skin:
     ruler: int = field(default=0, metadata={"limits": (0, MAX_RULER, "")})
     """Instant at which rows are sampled, in sixteenths of the time in which the columns fall through known resistors at
     the guard crossings (docs/cell.md); 0: there are switches, and rows are sampled at the end of ``settle_us``."""
-    levels: int = field(default=1, metadata={"limits": (1, MAX_LEVELS, "")})
-    """Levels of force of each cell with a ruler (docs/levels.md): rows are sampled so many times, the lightest level at
-    ``ruler`` and each next one after a quarter of that time. A fourth level would need a third bit and count no better.
-    """
+    harder: tuple[int, ...] = ()
+    """Instants at which rows are sampled for up to two harder levels of force, falling, in sixteenths as ``ruler``
+    (docs/levels.md). Then a map has the level of each cell: in how many samples it read pressed."""
     row_order: tuple[int, ...] = ()
     """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()
@@ -244,6 +243,11 @@ class Skin:
     def selects_low(self) -> bool:
         """Whether selected rows and pressed columns are low; otherwise they are high."""
         return self.diodes != "row2col"
+
+    @property
+    def levels(self) -> int:
+        """Levels of force that a cell can reach."""
+        return 1 + len(self.harder)
 
     @property
     def reads_rows(self) -> bool:

@@ -114,7 +114,7 @@ def _sixteenths(facts: Facts, values: Sequence[int], level: int) -> int:
     """Sixteenths of the ruler's time for a level, after commands with these values: with levels each names its own."""
     if facts.skin.levels > 1:
         values = [value % 256 for value in values if value // 256 == level]
-    usual = facts.skin.ruler // 4**level
+    usual = (facts.skin.ruler, *facts.skin.harder)[level]
     return values[-1] if values and 1 <= values[-1] <= 255 else usual
 
 
