@@ -183,7 +183,7 @@ def test_a_simulated_board_says_its_speed_only_where_it_lags(board):
 
 
 def test_the_panel_names_no_color_twice():
-    source = SimpleNamespace(sheet=SimpleNamespace(report="cells", ghosts=True), cells=object())
+    source = SimpleNamespace(sheet=SimpleNamespace(report="cells", ghosts=True, levels=1), cells=object())
     marks = re.findall(r"color:(#\w+)", panel.legend(source, virtual=True))
     assert len(marks) == len(set(marks)) == 5
 
