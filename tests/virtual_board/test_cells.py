@@ -128,7 +128,7 @@ def test_the_example_of_levels_reads_a_palm_by_its_forces(capsys):
     assert zone.x_mm == pytest.approx(np.average(x, weights=weight) * skin.pitch_x_mm)
     assert zones.to_dict()["levels"] == zones.levels.tolist()
     (together,) = Batch.of([zones]).zones
-    assert all((together[name] == zones.array[0][name]).all() for name in zones.array.dtype.names)
+    assert all(np.array_equal(together[name], zones.array[0][name]) for name in zones.array.dtype.names)
     untouched = ["wire", "--rest", "--skin", str(file), f"sim://?scene=nothing&skin={file}"]
     assert cli.main(untouched) == 1
     assert "--rest needs a board built without `harder`" in capsys.readouterr().err
