@@ -22,9 +22,10 @@ class Ruler:
         """``moves``: pulse with a command's ``value``: sixteenths, and a ``level``, from 0, where there are several;
         ``begins``: row 0 does, in the next clock."""
         skin, self.settle = derived.skin, derived.settle_clocks
+        self._number = str(level or "")
         self._begins, self._most, self._first = begins, self.settle << FRACTION_BITS, derived.first_sample_clocks
         self._ignored = ~anywhere(skin) & (1 << skin.columns) - 1
-        self.clock = Signal(range(self.settle + 1), init=self.settle, name="sample_clock")
+        self.clock = Signal(range(self.settle + 1), init=self.settle, name=f"sample_clock{self._number}")
         self.early = Signal()  # the guard column may not have fallen
         usual = derived.rulers[level]
         self._asked = asked = Signal(range(LEVEL_STEP), init=usual, name="ruler_asked")
@@ -36,9 +37,9 @@ class Ruler:
     def measure(self, m: Module, starts: Value, of_guard: Value, read: Value, faulty: Value) -> None:
         """``starts``: first clock of the guard row's slot; ``of_guard``: ``read`` are columns that read pressed in it,
         two clocks after the pins; ``faulty``: columns reported open."""
-        sum_ = Signal(range(self._most + MAX_RULER + 1), name="ruler_sum")
+        sum_ = Signal(range(self._most + MAX_RULER + 1), name=f"ruler_sum{self._number}")
         step = Signal.like(self._asked, name="ruler_step")
-        fell, late = Signal(name="ruler_fell"), Signal(name="ruler_late")
+        fell, late = Signal(name="ruler_fell"), Signal(name=f"ruler_late{self._number}")
         ignored = faulty | self._ignored
         falls = (read | ignored).all() & (read & ~ignored).any()
         with m.If(starts):
