@@ -21,7 +21,6 @@ SKINS = {
     "32x32": contactfpga.Skin(rows=32, columns=32, settle_us=40.0),
     "64x64": contactfpga.Skin(rows=64, columns=64, settle_us=40.0),
     "cells": contactfpga.Skin(rows=8, columns=11, report="cells", settle_us=10.0),
-    "levels": contactfpga.Skin(rows=5, columns=6, report="cells", ruler=9, harder=(2,), precharge_us=1.0, guard=True),
     "guard": contactfpga.Skin(guard=True),
 }
 

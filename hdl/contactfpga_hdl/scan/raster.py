@@ -231,7 +231,7 @@ class Scanner(wiring.Component):
                 m.d.comb += now.eq(kept)
             m.d.sync += kept.eq(now)
             read.append(now)
-        return Cat(popcount(columns)[: self.derived.level_bits] for columns in zip(*read))
+        return Cat(Value.cast(popcount(columns))[: self.derived.level_bits] for columns in zip(*read))
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """Drive columns while no row is driven, except for a clock at either end."""
