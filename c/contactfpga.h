@@ -720,11 +720,7 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
     uint32_t most_x = hello->columns - 1u, most_y = hello->rows - 1u, carried = 0;
     for (uint16_t i = 0; i < frame->items; i++) {
         if (hello->report == CONTACTFPGA_CELLS) {
-            for (uint8_t column = 0; column < hello->columns; column++) {
-                uint32_t level = contactfpga__cell(reader, i, column);
-                if (level > hello->levels) return false;
-                carried += level > 0;
-            }
+            for (uint8_t column = 0; column < hello->columns; column++) carried += contactfpga__cell(reader, i, column) > 0;
             continue;
         }
         contactfpga_zone zone;
@@ -739,7 +735,8 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
     return overflow ? carried < frame->cells : carried == frame->cells;
 }
 
-/* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros. */
+/* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros, and no cell has a level that
+ * the board lacks. */
 static inline bool contactfpga__filled_up(const contactfpga_reader *reader, uint16_t items) {
     for (uint16_t i = 0; i < items; i++) {
         contactfpga_zone zone;
@@ -748,6 +745,8 @@ static inline bool contactfpga__filled_up(const contactfpga_reader *reader, uint
         if (reader->hello.report == CONTACTFPGA_CELLS ? contactfpga__bits(row, used, 8 * bytes - used)
                                                       : !contactfpga__read_zone(reader, i, &zone))
             return false;
+        for (unsigned column = 0; reader->hello.levels > 1 && column < reader->hello.columns; column++)
+            if (contactfpga__cell(reader, i, column) > reader->hello.levels) return false;
     }
     return true;
 }

@@ -72,6 +72,7 @@ def unused_bits(plain, index):
         (Wire(FULL).plain_zones(ONE * 2, zones=3, flags=["overflow"]), FULL, "content"),
         (WIRE.plain_zones(ONE, cells=5), REFERENCE, "content"),
         (Wire(MAP).plain_cells([[0, 1, 2, 3, 0]] * 3), MAP, "content"),
+        (Wire(MAP).plain_cells([[0, 1, 2, 3, 0]] * 3, flags=["mismatch"]), MAP, "content"),
         (unused_bits(Wire(MAP).plain_cells([[2] * 5] * 3), 1), MAP, "content"),
         (Wire(MAP).plain_cells([[2] * 5] * 3, cells=14), MAP, "content"),
         (Wire(BITMAP).plain_cells([[1] * 5] * 3), MAP, "length"),

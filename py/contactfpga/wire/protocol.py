@@ -240,7 +240,7 @@ def _check_sums(records: list[list[int]], cells: int, flags: int, widths: Widths
     sheet = widths.sheet
     if sheet.report == "cells":
         carried = sum(map(bool, itertools.chain.from_iterable(records)))
-        possible = carried == cells and max(map(max, records)) <= sheet.levels
+        possible = carried == cells
     else:
         carried = sum(record[0] for record in records)
         possible = carried < cells if flags & OVERFLOW else carried == cells
@@ -298,7 +298,10 @@ def _bitmap(data: bytes, widths: Widths) -> list[list[int]]:
     if bits[:, carried:].any():
         raise PacketError("content", "a bitmap row is filled up with something other than zeros")
     cells = bits[:, :carried].reshape(len(bits), -1, widths.level_bits)
-    rows: list[list[int]] = (cells << np.arange(widths.level_bits, dtype=np.uint8)).sum(axis=2).tolist()
+    levels = (cells << np.arange(widths.level_bits, dtype=np.uint8)).sum(axis=2)
+    if levels.max() > widths.sheet.levels:
+        raise PacketError("content", f"a cell has level {levels.max()}; the sheet has {widths.sheet.levels}")
+    rows: list[list[int]] = levels.tolist()
     return rows
 
 

@@ -49,7 +49,7 @@ _BOXES = [("box", np.int64, (4,)), ("box_mm", np.float64, (4,))]
 @functools.cache
 def dtype_of(divided: bool, extent: bool, levels: bool = False) -> np.dtype[np.void]:
     """:data:`DTYPE` or, with barycenters, :data:`DIVIDED_DTYPE`; of a Skin with ``extent`` also the fields ``box`` and
-    ``box_mm`` of :class:`Zone`, four numbers each; of one with ``levels`` also ``pressure``."""
+    ``box_mm`` of :class:`Zone`, four numbers each; of one with levels of force also ``pressure``."""
     dtype = DIVIDED_DTYPE if divided else DTYPE
     if levels:
         return np.dtype([*dtype.descr, ("pressure", np.float64)])
@@ -76,7 +76,7 @@ class Zone:
     """Area of the cells in mm2, measured on the sheet."""
     x_mm: float | None
     """Barycenter along the columns in mm, on the sheet laid flat, within :attr:`Zones.rounding_mm`; column 0 lies at 0.
-    With ``levels`` a cell counts once for each level that it reached.
+    With levels of force a cell counts once for each that it reached.
     On a sheet whose ends meet, x is from 0 to the circumference. None for a zone that is :attr:`winding`, and for one
     without cells, which only a frame flagged ``mismatch`` can have."""
     y_mm: float | None
@@ -92,8 +92,8 @@ class Zone:
     """On a sheet whose ends meet: ``ring`` if a path of the zone's cells closes around the cylinder; ``wound`` if none
     does, but the cells lie on more than two turns. Otherwise ""."""
     pressure: float | None = None
-    """Mean level of the cells, without a unit: from 1 to the Skin's ``levels``, the more the harder it is pressed. None
-    for a Skin of one level."""
+    """Mean level of the cells, without a unit: from 1 to the number of the Skin's levels of force, the more the harder
+    it is pressed. None for a Skin of one level."""
     box: Box | None = None
     """First and last column and row of the cells; None unless the Skin has ``extent``."""
     box_mm: BoxMm | None = None
@@ -258,8 +258,8 @@ class Zones(Sequence[Zone]):
 
     @property
     def levels(self) -> np.ndarray | None:
-        """(rows, columns) int64 with ``levels``: how many levels of force each cell reached, 0 at rest; otherwise
-        None."""
+        """(rows, columns) int64 with levels of force (docs/levels.md): how many of them each cell reached, 0 at rest;
+        otherwise None."""
         return self.frame.levels
 
     @property
@@ -289,8 +289,8 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def weighted(self) -> np.ndarray:
-        """(n, 3) int64 of each of :attr:`records` with ``levels``: sum of the levels, and of columns and rows times the
-        level."""
+        """(n, 3) int64 of each of :attr:`records`, with levels of force: sum of the levels, and of columns and rows
+        times the level."""
         assert self.frame.levels is not None
         return levels.moments(self.frame.levels, self._labels)[:, 1:]
 
