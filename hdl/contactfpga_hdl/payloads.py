@@ -22,12 +22,6 @@ def pressed_cells(derived: Derived, cells: Value) -> Value:
     return cells if bits == 1 else Cat(cells.word_select(column, bits).any() for column in range(derived.skin.columns))
 
 
-def of_columns(derived: Derived, columns: int) -> int:
-    """Bits of a row's ``cells`` in these columns, given as bits."""
-    bits, spread = derived.level_bits, (column for column in range(derived.skin.columns) if columns >> column & 1)
-    return sum((1 << bits) - 1 << bits * column for column in spread)
-
-
 def row_bits(derived: Derived) -> int:
     return max(1, (derived.skin.rows - 1).bit_length())
 

@@ -134,7 +134,7 @@ FAULTS = {
         "tests/cosim/test_several.py::test_each_of_sixteen_sheets_raises_contact_and_keeps_its_grant"),
     "a masked switch tells of motion": Fault("scan/reversal_rows.py", "touched.eq(self.read & whole)",
         "touched.eq(self.read)", f"{GATEWARE}/test_reversal_scanner.py"),
-    "a harder level is sampled a clock early": Fault("scan/raster.py", "slots.clock == ruler.clock + 1",
+    "a harder level is sampled a clock early": Fault("scan/levels.py", "slots.clock == ruler.clock + 1",
         "slots.clock == ruler.clock", LEVELS),
     "a command for one level moves all": Fault("scan/ruler.py", "moves & (fits | (value == first))", "moves",
         LEVELS),

@@ -7,11 +7,9 @@ from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.payloads import of_columns
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row, moves_sample, scan_ports
 from contactfpga_hdl.scan.stuck import Stuck, present
-from contactfpga_hdl.util.bits import popcount
 from contactfpga_hdl.util.upset import upset
 
 
@@ -100,15 +98,17 @@ class Scanner(wiring.Component):
         ]
         # Sample, without masked switches
         levels = self._sample_columns(m, slots, reader, sample)
-        m.d.comb += [
-            sample.read.eq(~levels if skin.selects_low else levels),
-        ]
-        cells = self._levels(m, slots, reader, sample) if skin.levels > 1 else sample.read
+        m.d.comb += sample.read.eq(~levels if skin.selects_low else levels)
+        cells: Value = sample.read
+        if skin.levels > 1:
+            from contactfpga_hdl.scan.levels import count_levels
+
+            cells = count_levels(m, self, slots, reader.levels, sample)
         m.d.comb += sample.pressed.eq(cells)
         with m.Switch(sample.row):
             for row in sorted({row for row, _ in skin.mask}):
                 with m.Case(row):
-                    m.d.comb += sample.pressed.eq(cells & of_columns(self.derived, present(skin, row)))
+                    m.d.comb += sample.pressed.eq(cells & present(skin, row, self.derived.level_bits))
         # Rows
         with m.If(sample.of_row):
             m.d.sync += [
@@ -214,24 +214,6 @@ class Scanner(wiring.Component):
         with m.If(reader.done):
             m.d.sync += kept.eq(reader.levels)
         return Mux(reader.done, reader.levels, kept)
-
-    def _levels(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
-        """The level of each column: in how many samples it read pressed. Those of harder levels come on their own."""
-        from contactfpga_hdl.scan.ruler import Ruler
-
-        skin, read = self.skin, [sample.read[: self.skin.columns]]
-        for level in range(1, skin.levels):
-            ruler = Ruler(m, self.derived, self.moves, self.clocks, slots.begins_rows, level)
-            sample.harder.append(ruler)
-            now, kept = (Signal(skin.columns, name=f"{name}_{level}") for name in ("level_now", "level_kept"))
-            live = reader.levels[: skin.columns]
-            with m.If(slots.clock == ruler.clock + 1):  # two synchronizer stages after the sample
-                m.d.comb += now.eq(~live if skin.selects_low else live)
-            with m.Else():
-                m.d.comb += now.eq(kept)
-            m.d.sync += kept.eq(now)
-            read.append(now)
-        return Cat(Value.cast(popcount(columns))[: self.derived.level_bits] for columns in zip(*read))
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """Drive columns while no row is driven, except for a clock at either end."""
