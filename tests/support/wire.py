@@ -122,7 +122,7 @@ class Wire:
     def plain_cells(self, bitmap, *, cells=None, flags=(), **trailer) -> bytes:
         width = 1 if self.skin.levels == 1 else 2
         body = b"".join(fields(*((int(cell), width) for cell in row)) for row in bitmap)
-        cells = sum(cell > 0 for row in bitmap for cell in row) if cells is None else cells
+        cells = sum(int(cell > 0) for row in bitmap for cell in row) if cells is None else cells
         return body + self.trailer(cells=cells, **trailer) + last_byte(CELLS, flags)
 
     def cells(self, bitmap, **options) -> bytes:

@@ -129,8 +129,8 @@ class Tally(wiring.Component):
         # Groups of a row, one per clock
         number = row_number(m, self.derived, self.row, self.taken)
         with m.If(self.taken & self.row.cells.any()):
-            m.d.sync += [first.eq(0), left.eq(self._groups + 1), y.eq(number)]
             m.d.sync += cells.eq(pressed_cells(self.derived, self.row.cells))
+            m.d.sync += [first.eq(0), left.eq(self._groups + 1), y.eq(number)]
         with m.Elif(self.busy & ~self.hold):
             m.d.sync += [
                 cells.eq(cells >> self._columns),
