@@ -40,6 +40,7 @@ extern "C" {
 #endif
 
 #define CONTACTFPGA_MAX_LINES 64
+#define CONTACTFPGA_MAX_LEVELS 3
 #define CONTACTFPGA_MAX_UNITS 8
 #define CONTACTFPGA_REQUEST_BYTES 10
 #define CONTACTFPGA_PULSED_REQUEST_BYTES 66
@@ -91,6 +92,7 @@ typedef struct {
     bool plane;           /* else a cylinder */
     bool closed;          /* its last column is a neighbor of the first */
     bool extent;          /* its zones say how far they reach */
+    uint8_t levels;       /* of force of a cell; 1: it is pressed or not */
     bool guard;           /* it has guard lines, and names faults */
     bool self_test;       /* it can test its lines */
     uint16_t zone_capacity;
@@ -149,7 +151,7 @@ typedef struct {
 
 /* Widths of a sheet's fields on the wire. */
 typedef struct {
-    uint8_t area, sum_x, sum_y, zones, overwritten, record[8], record_bytes, item_bytes, trailer_bytes;
+    uint8_t area, sum_x, sum_y, zones, overwritten, record[8], record_bytes, item_bytes, trailer_bytes, cell;
     uint16_t cells, max_zones, max_items;
 } contactfpga_widths;
 
@@ -197,6 +199,9 @@ static inline bool contactfpga_zone_at(const contactfpga_reader *reader, uint16_
 
 /* Whether a cell of the last frame is pressed, with CONTACTFPGA_CELLS; else, and outside the sheet, false. */
 static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t row, uint8_t column);
+
+/* How many of the board's levels of force a cell of the last frame reached; likewise, and else 0. */
+static inline uint8_t contactfpga_level(const contactfpga_reader *reader, uint8_t row, uint8_t column);
 
 /* Whether the board's last report says that a row or a column is open before its far end, that a column (the guard column
  * counts as the one after the last) read pressed while no row was driven, or that the self-test found joined lines. */
@@ -386,7 +391,8 @@ static inline contactfpga_widths contactfpga__widths(const contactfpga_hello *he
     unsigned record = 0;
     for (int i = 0; i < 8; i++) record += w.record[i];
     w.record_bytes = contactfpga__bytes(record);
-    w.item_bytes = hello->report == CONTACTFPGA_CELLS ? contactfpga__bytes(columns) : w.record_bytes;
+    w.cell = contactfpga__width(hello->levels);
+    w.item_bytes = hello->report == CONTACTFPGA_CELLS ? contactfpga__bytes(columns * w.cell) : w.record_bytes;
     w.max_items = hello->report == CONTACTFPGA_CELLS ? hello->rows : hello->zone_capacity;
     unsigned counted = 24u + 8 + 3 + w.area + w.zones;
     w.trailer_bytes = (uint8_t)(contactfpga__bytes(counted + 4) + 1);
@@ -422,6 +428,7 @@ static inline bool contactfpga__may_be(const contactfpga_hello *hello) {
         && hello->rows <= CONTACTFPGA_MAX_LINES && hello->columns <= CONTACTFPGA_MAX_LINES
         && hello->fraction_bits <= most_bits && (hello->connectivity == 4 || hello->connectivity == 8)
         && !(hello->extent && hello->report == CONTACTFPGA_CELLS)
+        && hello->levels <= (hello->report == CONTACTFPGA_CELLS && !hello->closed ? CONTACTFPGA_MAX_LEVELS : 1)
         && (!hello->closed || (hello->columns >= 3 && !hello->plane && hello->report != CONTACTFPGA_BARYCENTER))
         && hello->zone_capacity >= 1 && hello->zone_capacity <= contactfpga__max_zones(hello) && hello->clock_hz
         && hello->baud;
@@ -458,7 +465,8 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
     switch (kind) {
     case CONTACTFPGA__SHEET:
         hello->rows = value[0], hello->columns = value[1], hello->report = value[3];
-        hello->connectivity = value[2] & 0x3F, hello->closed = value[2] >> 7, hello->extent = value[2] >> 6 & 1;
+        hello->connectivity = value[2] & 15, hello->closed = value[2] >> 7, hello->extent = value[2] >> 6 & 1;
+        hello->levels = (uint8_t)(1 + (value[2] >> 4 & 3));
         hello->fraction_bits = value[4], hello->on_change = value[5] == 1;
         hello->zone_capacity = (uint16_t)(value[6] | value[7] << 8), hello->ghosts = value[8] == 1;
         hello->guard = value[9] & 1;
@@ -556,7 +564,7 @@ static inline bool contactfpga__same_sheet(const contactfpga_hello *one, const c
         && one->zone_capacity == other->zone_capacity && one->pitch_x_mm == other->pitch_x_mm
         && one->pitch_y_mm == other->pitch_y_mm && one->plane == other->plane
         && (one->plane || one->radius_mm == other->radius_mm) && one->closed == other->closed
-        && one->extent == other->extent && one->ghosts == other->ghosts
+        && one->extent == other->extent && one->levels == other->levels && one->ghosts == other->ghosts
         && !memcmp(one->fingerprint, other->fingerprint, sizeof one->fingerprint);
 }
 
@@ -707,14 +715,18 @@ static inline bool contactfpga__has_extent(const contactfpga_hello *hello, const
     return width == columns || along <= (width - 1) * scale;
 }
 
+static inline uint32_t contactfpga__cell(const contactfpga_reader *reader, size_t row, unsigned column) {
+    const contactfpga_widths *w = &reader->widths;
+    return contactfpga__bits(reader->packet + row * w->item_bytes, column * w->cell, w->cell);
+}
+
 /* Zones that cannot be, or that do not add up; only asked where the board flags no mismatch. */
 static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const contactfpga_frame *frame) {
     const contactfpga_hello *hello = &reader->hello;
     uint32_t most_x = hello->columns - 1u, most_y = hello->rows - 1u, carried = 0;
     for (uint16_t i = 0; i < frame->items; i++) {
         if (hello->report == CONTACTFPGA_CELLS) {
-            for (uint8_t column = 0; column < hello->columns; column++)
-                carried += contactfpga__bits(reader->packet + (size_t)i * reader->widths.item_bytes, column, 1);
+            for (uint8_t column = 0; column < hello->columns; column++) carried += contactfpga__cell(reader, i, column) > 0;
             continue;
         }
         contactfpga_zone zone;
@@ -729,15 +741,18 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
     return overflow ? carried < frame->cells : carried == frame->cells;
 }
 
-/* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros. */
+/* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros, and no cell has a level that
+ * the board lacks. */
 static inline bool contactfpga__filled_up(const contactfpga_reader *reader, uint16_t items) {
     for (uint16_t i = 0; i < items; i++) {
         contactfpga_zone zone;
-        unsigned columns = reader->hello.columns, bytes = reader->widths.item_bytes;
+        unsigned bytes = reader->widths.item_bytes, used = (unsigned)reader->hello.columns * reader->widths.cell;
         const uint8_t *row = reader->packet + (size_t)i * bytes;
-        if (reader->hello.report == CONTACTFPGA_CELLS ? contactfpga__bits(row, columns, 8 * bytes - columns)
+        if (reader->hello.report == CONTACTFPGA_CELLS ? contactfpga__bits(row, used, 8 * bytes - used)
                                                       : !contactfpga__read_zone(reader, i, &zone))
             return false;
+        for (unsigned column = 0; reader->hello.levels > 1 && column < reader->hello.columns; column++)
+            if (contactfpga__cell(reader, i, column) > reader->hello.levels) return false;
     }
     return true;
 }
@@ -990,10 +1005,13 @@ static inline bool contactfpga_zone_at(const contactfpga_reader *reader, uint16_
     return true;
 }
 
+static inline uint8_t contactfpga_level(const contactfpga_reader *reader, uint8_t row, uint8_t column) {
+    if (reader->hello.report != CONTACTFPGA_CELLS || row >= reader->frame.items || column >= reader->hello.columns) return 0;
+    return (uint8_t)contactfpga__cell(reader, row, column);
+}
+
 static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t row, uint8_t column) {
-    if (reader->hello.report != CONTACTFPGA_CELLS || row >= reader->frame.items || column >= reader->hello.columns)
-        return false;
-    return contactfpga__bits(reader->packet + (size_t)row * reader->widths.item_bytes, column, 1);
+    return contactfpga_level(reader, row, column) > 0;
 }
 
 static inline bool contactfpga_row_open(const contactfpga_reader *reader, uint8_t row) {

@@ -43,8 +43,8 @@ static void show_frame(const contactfpga_frame *frame) {
         if (reader.hello.extent) printf(",%u,%u,%u,%u", zone.left, zone.right, zone.top, zone.bottom);
     }
     for (uint8_t row = 0; row < reader.hello.rows; row++)
-        for (uint8_t column = 0; column < reader.hello.columns; column++)
-            if (contactfpga_pressed(&reader, row, column)) printf(" %u:%u", row, column);
+        for (uint8_t column = 0; column < reader.hello.columns; column++) /* once for each level that it reached */
+            for (uint8_t level = contactfpga_level(&reader, row, column); level; level--) printf(" %u:%u", row, column);
     printf("\n");
 }
 

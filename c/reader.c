@@ -72,7 +72,7 @@ typedef struct {
 
 /* What sheets are made of. */
 typedef struct {
-    uint32_t known, rows, columns, connectivity, report, fraction_bits, closed, extent, zone_capacity, prefix;
+    uint32_t known, rows, columns, connectivity, report, fraction_bits, closed, extent, levels, zone_capacity, prefix;
 } sheet;
 
 /* The newest frame; its fields, those of the one before it, and the records of both follow. */
@@ -502,7 +502,7 @@ static void set_sheet(contactfpga_reader *decoder, const sheet *told) {
     hello->rows = (uint8_t)told->rows, hello->columns = (uint8_t)told->columns;
     hello->connectivity = (uint8_t)told->connectivity, hello->report = (uint8_t)told->report;
     hello->fraction_bits = (uint8_t)told->fraction_bits, hello->closed = told->closed;
-    hello->extent = told->extent;
+    hello->extent = told->extent, hello->levels = (uint8_t)told->levels;
     hello->zone_capacity = (uint16_t)told->zone_capacity;
     hello->fingerprint[0] = (uint8_t)told->prefix, hello->fingerprint[1] = (uint8_t)(told->prefix >> 8);
     decoder->widths = contactfpga__widths(hello);

@@ -1,6 +1,6 @@
 """Data layouts between the stages."""
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -10,9 +10,16 @@ from contactfpga.wire.framing import DIGIT_BITS
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: a bit per column, whether the row is the frame's last, and its number if the scan skips rows."""
+    """A sampled row: a bit per column, or its level; whether the row is the frame's last; and its number if the scan
+    skips rows."""
     number = {"y": row_bits(derived)} if derived.skips else {}
-    return data.StructLayout({"cells": derived.skin.columns, "last": 1, **number})
+    return data.StructLayout({"cells": derived.skin.columns * derived.level_bits, "last": 1, **number})
+
+
+def pressed_cells(derived: Derived, cells: Value) -> Value:
+    """A bit per column of a row's ``cells``."""
+    bits = derived.level_bits
+    return cells if bits == 1 else Cat(cells.word_select(column, bits).any() for column in range(derived.skin.columns))
 
 
 def row_bits(derived: Derived) -> int:

@@ -20,7 +20,7 @@ def probe_ports(derived: Derived) -> dict[str, wiring.Member]:
     item = Out(8 * derived.item_bytes)
     return {
         "row_transfer": Out(1),
-        "row_cells": Out(derived.skin.columns),
+        "row_cells": Out(derived.skin.columns * derived.level_bits),
         "row_last": Out(1),
         "record_transfer": Out(1),
         "record_data": Out(zone_layout(derived).size) if divides else item,

@@ -53,7 +53,7 @@ static void *feed_line(void *nothing) {
 
 static void *look(void *nothing) {
     static uint8_t out[1 << 17];
-    sheet told = {1, 16, 16, 8, 0, 0, 0, 0, 64, 0x1234};
+    sheet told = {1, 16, 16, 8, 0, 0, 0, 0, 1, 64, 0x1234};
     base known = {1, 0, 0, 0, 0.0, 1e-6};
     static fit clocks;
     int64_t time_us = 1;
@@ -72,7 +72,7 @@ static void *look(void *nothing) {
 
 /* Every array is as long as what it is for, so that the sanitizer sees what is written after it. */
 static void decode_alone(const uint8_t *data, size_t length) {
-    sheet told = {1, 16, 16, 8, 0, 0, 0, 0, 64, 0x1234};
+    sheet told = {1, 16, 16, 8, 0, 0, 0, 0, 1, 64, 0x1234};
     size_t packets = 0;
     for (size_t i = 0; i < length; i++) packets += !data[i];
     fields *found = malloc(packets * sizeof *found);

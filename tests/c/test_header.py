@@ -46,6 +46,7 @@ SKINS = [
     Skin(rows=6, columns=7, extent=True),
     Skin(rows=5, columns=8, extent=True, report="barycenter", barycenter_bits=2, connectivity=4),
     Skin(rows=7, columns=5, extent=True, surface="cylinder", radius_mm=9.0, closed=True),
+    Skin(rows=4, columns=7, report="cells", ruler=9, harder=(2,), guard=True, precharge_us=1.0, settle_us=40.0),
 ]
 
 
@@ -141,7 +142,8 @@ def frame_line(zones: Zones) -> str:
     items = items if frame.extents is None else np.concatenate([items, frame.extents], axis=1)
     words = [",".join(map(str, row)) for row in items.tolist()]
     if frame.bitmap is not None:
-        words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
+        reached = frame.bitmap * 1 if frame.levels is None else frame.levels
+        words = [f"{row}:{column}" for row, column in np.argwhere(reached) for _ in range(reached[row, column])]
     fields = (frame.sequence, flags, frame.heard, frame.cells, frame.zones, frame.overwritten)
     return " ".join(map(str, ("frame", zones.time_us, *fields, *words)))
 
@@ -358,6 +360,7 @@ CHANGES = {
     Skin(clock_hz=24_000_000): [{"pitch_x_mm": 9.0}, {"pitch_y_mm": 9.0}, {"surface": "cylinder", "radius_mm": 99.0}],
     Skin(report="barycenter", barycenter_bits=3): [{"barycenter_bits": 4}],
     Skin(report="cells"): [{"diodes": "none"}],
+    Skin(report="cells", ruler=16, harder=(4,), guard=True, precharge_us=1.0): [{"harder": (4, 1)}],
     ROUND: [{"radius_mm": 8.0}, {}],  # with {} its ends do not meet, which no Skin of this pitch allows
 }
 

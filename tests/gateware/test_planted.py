@@ -29,6 +29,7 @@ class Fault(NamedTuple):
 
 
 GATEWARE = "tests/gateware"
+LEVELS = f"{GATEWARE}/test_ruler.py::test_each_frame_is_sampled_where_the_golden_model_says[levels]"
 FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
 FAULTS = {
     "readings go out with a report": Fault("link/other_packets.py",
@@ -135,6 +136,12 @@ FAULTS = {
         "tests/cosim/test_several.py::test_guard_lines_alive_and_fail_safe_of_each_sheet"),
     "a masked switch tells of motion": Fault("scan/reversal_rows.py", "touched.eq(self.read & whole)",
         "touched.eq(self.read)", f"{GATEWARE}/test_reversal_scanner.py"),
+    "a harder level is sampled a clock early": Fault("scan/levels.py", "slots.clock == ruler.clock + 1",
+        "slots.clock == ruler.clock", LEVELS),
+    "a command for one level moves all": Fault("scan/ruler.py", "moves & (fits | (value == first))", "moves",
+        LEVELS),
+    "a cell is counted for each bit of its level": Fault("report/audit.py",
+        "pressed_cells(self.derived, self.row.cells)", "self.row.cells", LEVELS),
     "a part on the upper turn stays on the lower": Fault("label/extent.py", "right[-1] | above", "right[-1]",
         f"{GATEWARE}/test_label_extent.py"),
     "a zone that winds has the columns of its turns": Fault("label/extent.py", "group.ring | group.wound | laps",

@@ -1,7 +1,8 @@
 """Samples at a multiple of the clocks in which the columns fall through the ruler.
 
 What only this kills: a ruler that counts a clock too many or too few, that waits for a column reported open or masked,
-or that reads a level, a lost ruler or a late fall otherwise than the golden model, whose cells close at any clock.
+or that reads a level, a lost ruler or a late fall otherwise than the golden model, whose cells close at any clock; with
+several levels, a sample left out, taken twice, or counted for another level or row.
 """
 
 import numpy as np
@@ -21,6 +22,37 @@ SKINS = {
     "zones": Skin(rows=3, columns=4, ruler=32, settle_us=24, **TINY),
     "cells, masked": Skin(rows=2, columns=3, ruler=20, report="cells", mask=((0, 1), (1, 1)), settle_us=20, **TINY),
     "one row, mirrored": Skin(rows=1, columns=2, ruler=8, diodes="row2col", fail_safe=True, settle_us=30, **TINY),
+    "levels": Skin(
+        rows=3, columns=5, ruler=60, harder=(15, 3), report="cells", mask=((0, 1), (2, 4)), settle_us=24, **TINY
+    ),
+    "two levels, mirrored": Skin(
+        rows=2,
+        columns=3,
+        ruler=24,
+        harder=(6,),
+        report="cells",
+        diodes="row2col",
+        settle_us=24,
+        row_drive="74hc595",
+        dual=True,
+        fail_safe=True,
+        alive=True,
+        **TINY,
+    ),
+    "levels on change": Skin(
+        rows=2,
+        columns=2,
+        ruler=30,
+        harder=(12, 2),
+        report="cells",
+        send="on_change",
+        keep_alive_ms=0.6,
+        row_order=(1, 0),
+        column_order=(1, 0),
+        units=1,
+        settle_us=26,
+        **TINY,
+    ),
     "shift registers": Skin(rows=4, columns=2, ruler=20, row_drive="74hc595", alive=True, settle_us=30, **TINY),
 }
 
@@ -43,7 +75,8 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
             close = rng.integers(0, known.settle + 3, skin.columns)
             pieces |= {at + clock: np.tile(close <= clock, (skin.rows, 1)) for clock in (-1, *close.tolist())}
     at = 10 * known.scan_clocks
-    for number, value in enumerate(rng.permutation([0, 1, 12, 23, 24, 64, 255, 256]).tolist(), 129 * 128 + 1):
+    values = [0, 1, 12, 23, 24, 64, 255, 256] if skin.levels == 1 else [0, 24, 255, 256, 296, 512 + 5, 512, 768 + 9]
+    for number, value in enumerate(rng.permutation(values).tolist(), 129 * 128 + 1):
         received.append((at, command(number, 2, value, False, known.bit_clocks)))
         at += 140 * known.bit_clocks + int(rng.integers(10, 4 * known.scan_clocks))
     return Timeline(
@@ -51,12 +84,18 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
     )
 
 
-@pytest.mark.parametrize("name", sample(SKINS, quick=["zones", "cells, masked"], slow=["shift registers"]))
+def in_row(skin: Skin, row: int) -> list[int]:
+    bits = skin.levels.bit_length()
+    return [row >> bits * column & (1 << bits) - 1 for column in range(skin.columns)]
+
+
+@pytest.mark.parametrize("name", sample(SKINS, quick=["zones", "cells, masked", "levels"], slow=["shift registers"]))
 def test_each_frame_is_sampled_where_the_golden_model_says(name):
     skin, frames = SKINS[name], 90
     timeline = falling(skin, np.random.default_rng(len(name)), frames)
     cycles = frames * facts(skin).scan_clocks
     expected = predict(skin, timeline, cycles)
     plain = predict(skin.replace(ruler=255), timeline, cycles)
+    assert {cell for _, row, _ in expected.rows for cell in in_row(skin, row)} == {*range(skin.levels + 1)}
     assert [row[1] for row in expected.rows] != [row[1] for row in plain.rows], "no sample was moved"
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100

@@ -119,7 +119,8 @@ def test_every_field_is_in_the_fingerprint():
         reversal.replace(self_test=True),
     ]
     falls = Skin(guard=True, precharge_us=1.0)
-    others += [falls, falls.replace(ruler=16)]
+    map_ = falls.replace(report="cells", ruler=16)
+    others += [falls, falls.replace(ruler=16), map_, map_.replace(harder=(4,))]
     measured = Skin(units=2)
     of_units = {"converter": "toy_converter:MINE", "converter_v": 5.0, "unit_sums": ((1, 1),)}
     others += [measured, *(measured.replace(**{name: value}) for name, value in of_units.items())]
@@ -134,6 +135,7 @@ def test_every_field_is_in_the_fingerprint():
         "barycenter_bits",
         "self_test",
         "ruler",
+        "harder",
     }
     assert {*OTHER, *elsewhere, *only_there, *of_units} == {field.name for field in dataclasses.fields(Skin)}
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
@@ -250,6 +252,7 @@ def test_fields_are_plain_values():
     fields = dataclasses.asdict(Skin(mask=[[1, 2]]))
     assert json.loads(json.dumps(fields)) == fields | {
         "mask": [[1, 2]],
+        "harder": [],
         "row_order": [],
         "column_order": [],
         "unit_sums": [],

@@ -27,6 +27,9 @@ SKINS = {
     "around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True),
     "extents": Skin(rows=5, columns=9, extent=True),
     "extents around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=9.0, closed=True, extent=True),
+    "levels of force": Skin(
+        rows=4, columns=11, report="cells", ruler=40, harder=(10, 2), guard=True, precharge_us=1.0, settle_us=40.0
+    ),
 }
 
 
@@ -81,7 +84,10 @@ def _stream(skin: Skin, seed: int) -> str:
             said = (time, 254 + index, index, index, 5 if index == 0 else 0)
             lines.append(" ".join(map(str, ("sweep", *said, *readings))))
     if skin.guard:
-        lines += [_packet(wire.report(1 << 1 | 1 << 3 + 2 | 1 << 3 + 4 + 4)), "faults row:1 column:2 stuck:4"]
+        lines += [
+            _packet(wire.report(1 << 1 | 1 << skin.rows + 2 | 1 << skin.rows + skin.columns + 4)),
+            "faults row:1 column:2 stuck:4",
+        ]
         lines += [_packet(wire.report(0)), "faults"]
     return "\n".join(lines) + "\n"
 
@@ -90,9 +96,11 @@ def _frame(wire: Wire, rng, index: int, sent: int, heard: int):
     skin, known = wire.skin, wire.known
     trailer = {"time": 2**22 + 100 * index, "sequence": sent, "heard": heard}
     if skin.report == "cells":
-        bitmap = rng.random((skin.rows, skin.columns)) < index / 3
-        words = [f"{row}:{column}" for row, column in zip(*bitmap.nonzero(), strict=True)]
-        return wire.cells(bitmap.tolist(), **trailer), words, int(bitmap.sum()), 0, 0
+        bitmap = (rng.random((skin.rows, skin.columns)) < index / 3) * np.ones(1, int)
+        if skin.levels > 1:
+            bitmap *= rng.integers(1, skin.levels + 1, bitmap.shape)
+        words = [f"{row}:{column}" for row, column in np.argwhere(bitmap) for _ in range(bitmap[row, column])]
+        return wire.cells(bitmap.tolist(), **trailer), words, np.count_nonzero(bitmap), 0, 0
     whole = index == 3  # all cells are one zone
     count = 1 if whole else min(index, skin.max_zones())
     rows = [_zone(skin, rng, whole, known.divided) for _ in range(count)]

@@ -2,6 +2,7 @@
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
+FALLS = {"report": "cells", "ruler": 16, "guard": True, "precharge_us": 1.0}
 REFUSED = [
     ({"name": 7}, "name is 7; it must be a string"),
     ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
@@ -17,6 +18,21 @@ REFUSED = [
     ),
     ({"ruler": 16}, "ruler is 16; columns that fall need guard = true, precharge_us and scan = 'raster'"),
     ({"ruler": 256}, "ruler is 256; it must lie between 0 and 255"),
+    ({"harder": 4}, "harder is 4; it must be a list of whole numbers"),
+    ({"harder": [4, 1.5]}, "harder is [4, 1.5]; it must be a list of whole numbers"),
+    ({**FALLS, "harder": [16, 4, 1]}, "harder has 3 levels; 2 are possible, as a cell has two bits"),
+    ({**FALLS, "harder": [4, 4]}, "harder has 4 after 4; each level is from 1 to below the lighter one's ruler"),
+    ({"harder": [4]}, "harder has 4 after 0; each level is from 1 to below the lighter one's ruler"),
+    ({**FALLS, "harder": [4, 0]}, "harder has 0 after 4; each level is from 1 to below the lighter one's ruler"),
+    ({**FALLS, "harder": [4], "report": "moments"}, "report is 'moments'; harder levels need report = 'cells'"),
+    (
+        {**FALLS, "harder": [4], "debounce": "sym_defer_pk"},
+        "debounce is 'sym_defer_pk'; harder levels need debounce = 'none'",
+    ),
+    (
+        {**FALLS, "harder": [4], "surface": "cylinder", "radius_mm": 40.0, "closed": True},
+        "closed is true; harder levels need closed = false",
+    ),
     ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
     ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
     ({"rows": 2, "row_order": [0, 0]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 2 times"),

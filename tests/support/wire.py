@@ -120,8 +120,9 @@ class Wire:
         return self.seal(self.plain_zones(moments, **options))
 
     def plain_cells(self, bitmap, *, cells=None, flags=(), **trailer) -> bytes:
-        body = b"".join(fields(*((int(cell), 1) for cell in row)) for row in bitmap)
-        cells = sum(int(cell) for row in bitmap for cell in row) if cells is None else cells
+        width = 1 if self.skin.levels == 1 else 2
+        body = b"".join(fields(*((int(cell), width) for cell in row)) for row in bitmap)
+        cells = sum(int(cell > 0) for row in bitmap for cell in row) if cells is None else cells
         return body + self.trailer(cells=cells, **trailer) + last_byte(CELLS, flags)
 
     def cells(self, bitmap, **options) -> bytes:
@@ -149,7 +150,7 @@ class Wire:
         skin = self.skin
         report = ["moments", "cells", "barycenter"].index(skin.report)
         bits = skin.barycenter_bits if skin.report == "barycenter" else 0
-        joins = skin.connectivity + 128 * skin.closed + 64 * skin.extent
+        joins = skin.connectivity + 128 * skin.closed + 64 * skin.extent + 16 * (skin.levels - 1)
         sizes = (skin.rows, skin.columns, joins, report, bits, skin.send == "on_change")
         facts = {
             SHEET: struct.pack("<BBBBBBHBB", *sizes, skin.zone_capacity, skin.diodes == "none", skin.guard),

@@ -198,6 +198,20 @@ def test_cells_are_colored_by_what_is_known_of_them():
     assert (colors != picture.OPEN).any(-1).sum() == 1
 
 
+def test_levels_of_force_are_shades():
+    skin = Skin(report="cells", ruler=64, harder=(16, 4), guard=True, precharge_us=1.0)
+    levels = np.arange(256).reshape(16, 16) % 4
+    frame = SimpleNamespace(flags=frozenset(), time_us=0, bitmap=levels > 0, levels=levels)
+    colors = picture.tile_colors(Zones(frame, skin.sheet)).astype(int)
+    away = np.abs(colors - picture.OPEN).sum(axis=1)
+    assert [set(away[levels.ravel() == level]) for level in (0, 3)] == [
+        {0},
+        {np.abs(np.subtract(picture.REPORTED, picture.OPEN)).sum()},
+    ]
+    assert away[2] == pytest.approx(2 * away[1], abs=2)
+    assert (np.diff(away[:4]) > 20).all()
+
+
 def test_a_trail_shows_the_last_second_of_each_contact():
     tracker, trails = Tracker(), picture.Trails(TILES["plane"].surface, 0.0, seconds=1.0)
     for step in range(31):

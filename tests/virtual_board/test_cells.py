@@ -1,7 +1,7 @@
 """Columns that fall through resistive cells, on the compiled board, and the example's file from force to frame.
 
 What only this kills: a row sampled at another multiple of the ruler than asked for, times at the wrong crossing, noise
-or edges of another size, and forces that do not become readings.
+or edges of another size, forces that do not become readings, and levels of force that do not become zones.
 """
 
 import json
@@ -15,6 +15,7 @@ from contactfpga.design.cover import load_cover
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
+from contactfpga.zones.batch import Batch
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.receiver import Receiver
 from contactfpga_sim.model.scenes.scene import palm
@@ -24,15 +25,17 @@ SKIN = Skin(rows=3, columns=4, ruler=24, report="cells", guard=True, precharge_u
 END, THRESHOLD = 0.9, 0.6
 
 
-def read(clocks, frames, noise=(0.0, 0.0, 0.0, 0.0)):
-    """(frames, rows, columns) cells of a board whose columns fall in these (row lines, column lines) clocks."""
-    with CompiledBoard(SKIN) as board:
-        board.fall(clocks / SKIN.clock_hz, END, THRESHOLD)
+def read(clocks, frames, noise=(0.0, 0.0, 0.0, 0.0), skin=SKIN):
+    """(frames, rows, columns) cells, or levels, of a board whose columns fall in these (row lines, column lines)
+    clocks."""
+    with CompiledBoard(skin) as board:
+        board.fall(clocks / skin.clock_hz, END, THRESHOLD)
         board.disturb(*noise)
-        board.hold(np.ones((1, SKIN.rows, SKIN.columns), bool), (frames + 2) * SKIN.derived.frame_clocks)
+        board.hold(np.ones((1, skin.rows, skin.columns), bool), (frames + 2) * skin.derived.frame_clocks)
         received = board.take("received")
     stream = zip(received["cycle"].tolist(), received["data"].tolist())
-    return np.array([one.frame.bitmap for one in Receiver(SKIN).take(stream)][1 : frames + 1])
+    sent = [one.frame for one in Receiver(skin).take(stream)][1 : frames + 1]
+    return np.array([one.bitmap if one.levels is None else one.levels for one in sent])
 
 
 @pytest.mark.parametrize("ruler", [37.0, 101.0])
@@ -43,6 +46,22 @@ def test_a_cell_reads_pressed_if_it_falls_within_the_multiple_of_the_rulers_time
     assert 0.2 < (cells < sample).mean() < 0.9
     sure = np.abs(cells - sample) > 3
     assert (read(clocks, 5)[:, sure] == (cells < sample)[sure]).all()
+
+
+def test_a_cell_has_each_level_by_whose_multiple_of_the_rulers_time_it_fell():
+    """Also a cell that leaks and never charges, one that is open, and a ruler that is lost: all samples are late."""
+    skin, ruler = SKIN.replace(ruler=48, harder=(20, 7)), 90.0
+    clocks = np.random.default_rng(3).uniform(2.0, 340.0, (skin.row_lines, skin.column_lines))
+    clocks[-1], clocks[:-1, -1] = [0.9 * ruler, ruler, 0.8 * ruler, 0.9 * ruler, np.inf], ruler
+    clocks[0, 0], clocks[1, 1] = 0.01, np.inf
+    cells, samples = clocks[:-1, :-1], np.array([48, 20, 7]) / 16 * ruler
+    reached = (cells < samples[:, None, None]).sum(axis=0)
+    assert {*reached.flat} == {0, 1, 2, 3}
+    sure = (np.abs(cells - samples[:, None, None]) > 3).all(axis=0)
+    assert (read(clocks, 4, skin=skin)[:, sure] == reached[sure]).all()
+    clocks[-1] = np.inf
+    late = np.abs(cells - 360) > 3
+    assert (read(clocks, 4, skin=skin)[2:, late] == 3 * (cells < 360)[late]).all()
 
 
 def test_noise_and_edges_turn_as_many_readings_as_they_should():
@@ -81,3 +100,35 @@ def test_the_example_reads_a_palm_by_its_forces_and_tells_its_rest(capsys):
     assert (answer["lightest"], answer["levels"]) == (None, [[None] * 16] * 16)
     assert cli.main(["wire", "--settle", *untouched]) == 1
     assert "take --rest" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_example_of_levels_reads_a_palm_by_its_forces(capsys):
+    """A palm's levels follow its forces, contacts carry their mean level, each level moves alone, and what one level
+    alone can measure says so."""
+    file = examples() / "levels.toml"
+    skin, cover = Skin.load(file), load_cover(file)
+    forces = palm(skin).forces_n(0.0, skin, cover)
+    with contactfpga.open(f"sim://?scene=palm&skin={file}", timeout=60.0) as board:
+        zones = board.read()
+        lighter = board.sample_at(3, level=2)
+        with pytest.raises(ValueError, match="level 4 at 3; it has 3 levels, at 0 to 255"):
+            board.sample_at(3, level=4)
+    for level, force_n in enumerate((0.13, 0.52, 2.08), 1):
+        assert (zones.levels[forces > 2.5 * force_n] >= level).all()
+        assert (zones.levels[forces < force_n / 2.5] < level).all()
+    assert ((zones.levels > 0) == zones.cells).all()
+    assert {*zones.levels.flat} == {0, 1, 2}
+    assert (lighter.cells == zones.cells).mean() > 0.98
+    assert (lighter.levels == 2).sum() < (zones.levels == 2).sum() / 2
+    y, x = np.nonzero(zones.levels)
+    (zone,), weight = zones, zones.levels[y, x]
+    assert zone.pressure == pytest.approx(weight.mean())
+    assert (zone.sum_x, zone.sum_y, zone.area_cells) == (x.sum(), y.sum(), len(x))
+    assert zone.x_mm == pytest.approx(np.average(x, weights=weight) * skin.pitch_x_mm)
+    assert zones.to_dict()["levels"] == zones.levels.tolist()
+    (together,) = Batch.of([zones]).zones
+    assert all(np.array_equal(together[name], zones.array[0][name]) for name in zones.array.dtype.names)
+    untouched = ["wire", "--rest", "--skin", str(file), f"sim://?scene=nothing&skin={file}"]
+    assert cli.main(untouched) == 1
+    assert "--rest needs a board built without `harder`" in capsys.readouterr().err

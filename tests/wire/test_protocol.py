@@ -101,13 +101,18 @@ def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
     assert (frame.bitmap, len(frame.moments)) == (None, 0)
 
 
-@given(st.data(), skins(report="cells"), TRAILERS)
+LEVELS = {"report": "cells", "guard": True, "precharge_us": 1.0, "ruler": 16}
+
+
+@given(st.data(), skins(report="cells") | skins(harder=(4,), **LEVELS) | skins(harder=(4, 1), **LEVELS), TRAILERS)
 @settings(max_examples=100, deadline=None)
-def test_bitmaps_arrive_exactly(data, skin, trailer):
+def test_bitmaps_and_maps_arrive_exactly(data, skin, trailer):
     seed = data.draw(st.integers(0, 1 << 32))
-    bitmap = np.random.default_rng(seed).random((skin.rows, skin.columns)) < 0.3
-    frame = frame_in(Wire(skin).cells(bitmap.tolist(), **trailer), skin)
+    levels = np.maximum(0, np.random.default_rng(seed).integers(-3, skin.levels + 1, (skin.rows, skin.columns)))
+    frame = frame_in(Wire(skin).cells(levels.tolist(), **trailer), skin)
+    bitmap = levels > 0
     assert np.array_equal(frame.bitmap, bitmap)
+    assert (frame.levels is None) if skin.levels == 1 else np.array_equal(frame.levels, levels)
     assert fields(frame) == trailer
     assert (frame.zones, frame.cells) == (0, int(bitmap.sum()))
     assert len(frame.moments) == 0
@@ -117,7 +122,10 @@ NAMES = st.text(max_size=8).filter(lambda name: name.isprintable() and name == n
 
 
 @given(
-    skins() | skins(report="barycenter", barycenter_bits=0) | skins(report="cells", diodes="none"),
+    skins()
+    | skins(report="barycenter", barycenter_bits=0)
+    | skins(report="cells", diodes="none")
+    | skins(harder=(4, 1), **LEVELS),
     st.sampled_from(["always", "on_change"]),
     st.floats(0.01, 1000.0),
     NAMES,

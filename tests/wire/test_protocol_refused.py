@@ -42,6 +42,7 @@ def refusal(plain, skin=REFERENCE):
 WIRE = Wire(REFERENCE)
 SMALL = Skin(rows=3, columns=5, **SLOW)  # its records and bitmap rows have bits to spare
 BITMAP = SMALL.replace(report="cells")
+MAP = BITMAP.replace(ruler=9, harder=(2,), guard=True, precharge_us=1.0)
 DIVIDED = SMALL.replace(report="barycenter", barycenter_bits=1)  # area 4, x 4, y 3 bits
 FULL = REFERENCE.replace(zone_capacity=2)
 ONE = [(4, 10, 6)]
@@ -65,6 +66,11 @@ def unused_bits(plain, index):
         (WIRE.plain_zones(ONE * 65), REFERENCE, "length"),
         (Wire(FULL).plain_zones(ONE * 2, zones=65, cells=99, flags=["overflow"]), FULL, "content"),
         (Wire(FULL).plain_zones(ONE * 2, zones=3, flags=["overflow"]), FULL, "content"),
+        (Wire(MAP).plain_cells([[0, 1, 2, 3, 0]] * 3), MAP, "content"),
+        (Wire(MAP).plain_cells([[0, 1, 2, 3, 0]] * 3, flags=["mismatch"]), MAP, "content"),
+        (unused_bits(Wire(MAP).plain_cells([[2] * 5] * 3), 1), MAP, "content"),
+        (Wire(MAP).plain_cells([[2] * 5] * 3, cells=14), MAP, "content"),
+        (Wire(BITMAP).plain_cells([[1] * 5] * 3), MAP, "length"),
         (WIRE.plain_zones(ONE, cells=3), REFERENCE, "content"),
         (WIRE.plain_zones([(0, 0, 0)]), REFERENCE, "content"),
         (WIRE.plain_zones([(1, 16, 0)]), REFERENCE, "content"),

@@ -2,6 +2,7 @@
 few or too many, a zone shared by order in place of distance, or a layer that is left out of a barycenter."""
 
 import itertools
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -66,6 +67,25 @@ def test_cells_belong_to_the_nearest_part():
     assert levels.label(np.array([[3, 1, 1, 1, 1, 1, 2, 2, 3]]), 4, 1).tolist() == [[1, 1, 1, 1, 2, 2, 2, 2, 2]]
     around = np.array([[4, 1, 1, 1, 1], [1, 0, 0, 0, 1], [1, 1, 4, 0, 1]])
     assert levels.label(around, 4, 2).tolist() == [[1, 1, 1, 2, 2], [1, 0, 0, 0, 2], [1, 2, 2, 0, 2]]
+
+
+def test_a_hostile_map_is_shared_by_distance_in_little_memory(rng):
+    """The first of equally near parts in row-major order takes a cell; 64x64 cells with 1,024 parts take a few MB."""
+    random = np.random.default_rng(rng.getrandbits(32))
+    for _ in range(50):
+        read = np.where(random.random(random.integers(1, 9, 2)) < 0.2, 3, 1)
+        peaks = np.argwhere(read == 3)
+        found, alone = levels.label(read, 4, 2), labels.label(read == 3, 4)
+        if alone.max() > 1:
+            near = [peaks[np.square(peaks - cell).sum(axis=1).argmin()] for cell in np.argwhere(read)]
+            same = {(part, alone[tuple(seed)]) for part, seed in zip(found.ravel(), near)}
+            assert len(same) == found.max() == alone.max()
+    read = np.ones((64, 64), np.int64)
+    read[::2, ::2] = 3
+    tracemalloc.start()
+    assert levels.label(read, 4, 2).max() == 1024
+    assert tracemalloc.get_traced_memory()[1] < 12e6
+    tracemalloc.stop()
 
 
 def test_moments_are_those_of_the_layers():

@@ -10,6 +10,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import (
     moments_layout,
     passed_layout,
+    pressed_cells,
     record_layout,
     row_layout,
     row_number,
@@ -128,7 +129,8 @@ class Tally(wiring.Component):
         # Groups of a row, one per clock
         number = row_number(m, self.derived, self.row, self.taken)
         with m.If(self.taken & self.row.cells.any()):
-            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(number)]
+            m.d.sync += cells.eq(pressed_cells(self.derived, self.row.cells))
+            m.d.sync += [first.eq(0), left.eq(self._groups + 1), y.eq(number)]
         with m.Elif(self.busy & ~self.hold):
             m.d.sync += [
                 cells.eq(cells >> self._columns),

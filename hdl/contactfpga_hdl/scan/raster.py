@@ -38,13 +38,14 @@ class _Sample:
         self.begins = Signal()  # the next one, of a row
         self.early: Value = Const(0)  # before the settle time is over
         self.moved: Any = None  # the sample's clock, where a command or the ruler moves it
+        self.harder: list[Any] = []  # with levels, the clocks of all but the lightest one's
         skin = derived.skin
         self.of_driven = Signal()  # high for a clock: it is there, and was taken while a row was driven
         self.of_row = Signal()  # and this is one of the sheet's rows
         self.of_released = Signal()  # likewise while no row was driven
         self.row = Signal(range(max(2, skin.row_lines)), init=first_row(skin))  # the next to be sampled
         self.read = Signal(skin.column_lines)  # columns that read pressed
-        self.pressed = Signal(skin.columns)  # and are not masked in this row
+        self.pressed = Signal(skin.columns * derived.level_bits)  # and are not masked in this row, or their levels
         self.is_first = self.row == 0
         self.is_last = Signal()  # as the slot says, so that a row's number that is wrong is so for one scan at most
         self.is_guard = self.row == skin.rows if skin.guard else Const(0)
@@ -97,14 +98,17 @@ class Scanner(wiring.Component):
         ]
         # Sample, without masked switches
         levels = self._sample_columns(m, slots, reader, sample)
-        m.d.comb += [
-            sample.read.eq(~levels if skin.selects_low else levels),
-            sample.pressed.eq(sample.read),
-        ]
+        m.d.comb += sample.read.eq(~levels if skin.selects_low else levels)
+        cells: Value = sample.read
+        if skin.levels > 1:
+            from contactfpga_hdl.scan.levels import count_levels
+
+            cells = count_levels(m, self, slots, reader.levels, sample)
+        m.d.comb += sample.pressed.eq(cells)
         with m.Switch(sample.row):
             for row in sorted({row for row, _ in skin.mask}):
                 with m.Case(row):
-                    m.d.comb += sample.pressed.eq(sample.read & present(skin, row))
+                    m.d.comb += sample.pressed.eq(cells & present(skin, row, self.derived.level_bits))
         # Rows
         with m.If(sample.of_row):
             m.d.sync += [
@@ -133,7 +137,8 @@ class Scanner(wiring.Component):
             live = ~reader.levels if skin.selects_low else reader.levels
             begun, clock_of = slots.following[0] & (slots.clock == 0), slots.clock
             under_way = sample.is_guard & (clock_of >= 2) & (clock_of <= self.derived.settle_clocks + 1)
-            sample.moved.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
+            for ruler in (sample.moved, *sample.harder):
+                ruler.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
         # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),

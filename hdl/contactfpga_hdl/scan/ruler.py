@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Module, Mux, Signal, Value
 
-from contactfpga.skin.derived import MAX_RULER, Derived
+from contactfpga.skin.derived import LEVEL_STEP, MAX_RULER, Derived
 from contactfpga_hdl.scan.stuck import anywhere
 
 FRACTION_BITS = 4
@@ -18,24 +18,28 @@ class Ruler:
     summed up clock by clock, so that nothing multiplies.
     """
 
-    def __init__(self, m: Module, derived: Derived, moves: Value, sixteenths: Value, begins: Value):
-        """``moves``: pulse with the value of a command in ``sixteenths``; ``begins``: row 0 does, in the next clock."""
+    def __init__(self, m: Module, derived: Derived, moves: Value, value: Value, begins: Value, level: int = 0):
+        """``moves``: pulse with a command's ``value``: sixteenths, and a ``level``, from 0, where there are several;
+        ``begins``: row 0 does, in the next clock."""
         skin, self.settle = derived.skin, derived.settle_clocks
+        self._number = str(level or "")
         self._begins, self._most, self._first = begins, self.settle << FRACTION_BITS, derived.first_sample_clocks
         self._ignored = ~anywhere(skin) & (1 << skin.columns) - 1
-        self.clock = Signal(range(self.settle + 1), init=self.settle, name="sample_clock")
+        self.clock = Signal(range(self.settle + 1), init=self.settle, name=f"sample_clock{self._number}")
         self.early = Signal()  # the guard column may not have fallen
-        self._asked = asked = Signal(range(MAX_RULER + 1), init=skin.ruler, name="ruler_asked")
-        fits = (sixteenths > 0) & (sixteenths <= MAX_RULER)
-        with m.If(moves):
-            m.d.sync += asked.eq(Mux(fits, sixteenths, skin.ruler))
+        usual = derived.rulers[level]
+        self._asked = asked = Signal(range(LEVEL_STEP), init=usual, name="ruler_asked")
+        first = level * LEVEL_STEP
+        fits = (value > first) & (value <= first + MAX_RULER)
+        with m.If(moves if skin.levels == 1 else moves & (fits | (value == first))):
+            m.d.sync += asked.eq(Mux(fits, value, usual))
 
     def measure(self, m: Module, starts: Value, of_guard: Value, read: Value, faulty: Value) -> None:
         """``starts``: first clock of the guard row's slot; ``of_guard``: ``read`` are columns that read pressed in it,
         two clocks after the pins; ``faulty``: columns reported open."""
-        sum_ = Signal(range(self._most + MAX_RULER + 1), name="ruler_sum")
+        sum_ = Signal(range(self._most + MAX_RULER + 1), name=f"ruler_sum{self._number}")
         step = Signal.like(self._asked, name="ruler_step")
-        fell, late = Signal(name="ruler_fell"), Signal(name="ruler_late")
+        fell, late = Signal(name="ruler_fell"), Signal(name=f"ruler_late{self._number}")
         ignored = faulty | self._ignored
         falls = (read | ignored).all() & (read & ~ignored).any()
         with m.If(starts):

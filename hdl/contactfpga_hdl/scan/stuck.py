@@ -9,9 +9,9 @@ from contactfpga.skin.derived import STUCK_BITS, STUCK_MAX
 from contactfpga_hdl.util.bits import popcount
 
 
-def present(skin: Skin, row: int) -> int:
-    """Columns, as bits, in which a row has an unmasked switch."""
-    return sum(1 << column for column in range(skin.columns) if (row, column) not in skin.mask)
+def present(skin: Skin, row: int, bits: int = 1) -> int:
+    """Columns, of so many bits, in which a row has an unmasked switch."""
+    return sum((1 << bits) - 1 << bits * column for column in range(skin.columns) if (row, column) not in skin.mask)
 
 
 def anywhere(skin: Skin) -> int:

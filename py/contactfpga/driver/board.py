@@ -13,9 +13,10 @@ from contactfpga.driver.link import Link, frame_of
 from contactfpga.driver.subscription import Subscription, checked
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
+from contactfpga.inputs.values import shown, whole
 from contactfpga.instruments.self_test import SelfTest
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
+from contactfpga.skin.derived import LEVEL_STEP, MAX_RULER, SAMPLE_AT, SELF_TEST
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
@@ -113,18 +114,23 @@ class Board(BoardFacts):
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
 
-    def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
+    def sample_at(self, clocks: int = 0, timeout: float = 1.0, *, level: int = 1) -> Zones:
         """From the next frame on, sample the columns this many clocks of the board after a row is selected. This
         measures the settle time that the sheet needs (``contactfpga wire --settle``). Returns the first frame sampled
         in this way. Until the value is 0 again, or the board restarts, slower cells do not read pressed.
 
-        A board with a ruler takes ``clocks`` as sixteenths of the ruler's time (docs/cell.md).
+        A board with a ruler takes ``clocks`` as sixteenths of the ruler's time (docs/cell.md). With several levels of
+        force it moves the sample of one ``level``, from 1, the lightest, on; ValueError for a level that it lacks, or
+        more than 255 sixteenths.
 
         0, larger values than the settle time, and values too early for the board (less than 2 clocks, or than shift
         registers take) mean the settle time. Raises the errors of :meth:`command`; boards with ``report = "cells"``
         take it.
         """
-        return self.command(SAMPLE_AT, clocks, timeout)
+        levels = self.sheet.levels
+        if whole(level) not in range(1, levels + 1) or (levels > 1 and not 0 <= clocks <= MAX_RULER):
+            raise ValueError(f"level {shown(level)} at {shown(clocks)}; it has {levels} levels, at 0 to {MAX_RULER}")
+        return self.command(SAMPLE_AT, clocks + LEVEL_STEP * (level - 1), timeout)
 
     def self_test(self, timeout: float = 2.0) -> SelfTest:
         """Have the board drive each of its lines alone, between scans, and return the result (:class:`SelfTest`).

@@ -52,7 +52,7 @@ class Sheet(ctypes.Structure):
         (name, ctypes.c_uint32)
         for name in (
             *("known", "rows", "columns", "connectivity", "report"),
-            *("fraction_bits", "closed", "extent", "zone_capacity", "prefix"),
+            *("fraction_bits", "closed", "extent", "levels", "zone_capacity", "prefix"),
         )
     ]
 
@@ -62,7 +62,7 @@ class Sheet(ctypes.Structure):
         report = ("moments", "cells", "barycenter").index(sheet.report)
         return cls(
             *(1, sheet.rows, sheet.columns, sheet.connectivity, report, sheet.barycenter_bits, sheet.closed),
-            sheet.extent,
+            *(sheet.extent, sheet.levels),
             *(sheet.zone_capacity, int.from_bytes(before, "little")),
         )
 

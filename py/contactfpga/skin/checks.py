@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -14,7 +15,7 @@ from contactfpga.choices.choice import Choice
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.skin.derived import Derived
-from contactfpga.skin.sheet import MIN_AROUND
+from contactfpga.skin.sheet import MAX_LEVELS, MIN_AROUND
 from contactfpga.skin.units import MAX_SUMS, MAX_WEIGHT
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def check_sheet(skin: Skin) -> dict[str, Any]:
     surface = check_surface(skin)
     _check_guard(skin)
     orders = {f"{kind}_order": _check_order(skin, kind) for kind in ("row", "column")}
-    return {"mask": mask, **surface, **orders, **check_units(skin)}
+    return {"mask": mask, "harder": _check_harder(skin), **surface, **orders, **check_units(skin)}
 
 
 def _check_order(skin: Skin, kind: str) -> tuple[int, ...]:
@@ -135,6 +136,24 @@ def _check_guard(skin: Skin) -> None:
         raise SkinError(f"ruler is {skin.ruler}; columns that fall need guard = true, precharge_us and scan = 'raster'")
     if skin.self_test and not skin.reads_rows:
         raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
+
+
+def _check_harder(skin: Skin) -> tuple[int, ...]:
+    values = [whole(one) for one in skin.harder] if isinstance(skin.harder, list | tuple) else [None]
+    harder = tuple(one for one in values if one is not None)
+    if len(harder) < len(values):
+        raise SkinError(f"harder is {shown(skin.harder)}; it must be a list of whole numbers")
+    if len(harder) >= MAX_LEVELS:
+        raise SkinError(f"harder has {len(harder)} levels; {MAX_LEVELS - 1} are possible, as a cell has two bits")
+    for lighter, one in itertools.pairwise((skin.ruler, *harder)):
+        if not 0 < one < lighter:
+            raise SkinError(f"harder has {one} after {lighter}; each level is from 1 to below the lighter one's ruler")
+    wanted: dict[str, Any] = {"report": "cells", "debounce": "none", "closed": False} if harder else {}
+    for name, value in wanted.items():
+        if getattr(skin, name) != value:
+            found, needed = (repr(one).lower() for one in (getattr(skin, name), value))
+            raise SkinError(f"{name} is {found}; harder levels need {name} = {needed}")
+    return harder
 
 
 def _check_mask(skin: Skin) -> Mask:

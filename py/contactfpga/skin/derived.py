@@ -44,9 +44,10 @@ SELF_TEST = 1
 """Number of the command that tests all lines (docs/protocol.md)."""
 SAMPLE_AT = 2
 """Number of the command that sets the clock of a row at which the columns are sampled, or with a ruler the sixteenths
-of its time."""
+of its time, plus ``LEVEL_STEP`` times the level, counted from 0, that is meant."""
 MAX_RULER = 255
 """Latest sample in sixteenths of the ruler's time."""
+LEVEL_STEP = MAX_RULER + 1
 
 
 class Widths:
@@ -113,7 +114,12 @@ class Widths:
     @functools.cached_property
     def bitmap_row_bytes(self) -> int:
         """Bytes of one row on the wire with ``report = "cells"``."""
-        return math.ceil(self.sheet.columns / 8)
+        return math.ceil(self.sheet.columns * self.level_bits / 8)
+
+    @property
+    def level_bits(self) -> int:
+        """Bits of a cell on the wire with ``report = "cells"``."""
+        return self.sheet.levels.bit_length()
 
     @functools.cached_property
     def trailer_bytes(self) -> int:
@@ -230,6 +236,11 @@ class Derived(Widths):
     def first_sample_clocks(self) -> int:
         """Least value of the command "sample at": shift registers are read by then."""
         return max(2, self.column_load_clocks + self.column_shift_clocks)
+
+    @property
+    def rulers(self) -> tuple[int, ...]:
+        """Instants of a row's samples in sixteenths of the ruler's time, the lightest level's first."""
+        return self.skin.ruler, *self.skin.harder
 
     @property
     def release_clocks(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-MAX_LINES, MIN_AROUND, MAX_BARYCENTER_BITS = 64, 3, 8
+MAX_LINES, MIN_AROUND, MAX_BARYCENTER_BITS, MAX_LEVELS = 64, 3, 8, 3
 """Limits of a sheet; ``MIN_AROUND``: least columns if its ends meet."""
 
 
@@ -35,6 +35,8 @@ class Sheet:
     """Whether the sheet lacks diodes, so that pressed switches can make others read pressed."""
     extent: bool = False
     """Whether zones come with their smallest and largest row and column."""
+    levels: int = 1
+    """Levels of force of each cell; 1: a cell is pressed or not."""
 
     @property
     def around_mm(self) -> float | None:
@@ -56,6 +58,7 @@ class Sheet:
         ranges = {
             "rows": (1, MAX_LINES),
             "columns": (1, MAX_LINES),
+            "levels": (1, MAX_LEVELS if self.report == "cells" and not self.closed else 1),
             "barycenter_bits": (0, MAX_BARYCENTER_BITS if self.report == "barycenter" else 0),
         }
         for name, (low, high) in ranges.items():

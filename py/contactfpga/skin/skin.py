@@ -65,6 +65,9 @@ class Skin:
     ruler: int = field(default=0, metadata={"limits": (0, MAX_RULER, "")})
     """Instant at which rows are sampled, in sixteenths of the time in which the columns fall through known resistors at
     the guard crossings (docs/cell.md); 0: there are switches, and rows are sampled at the end of ``settle_us``."""
+    harder: tuple[int, ...] = ()
+    """Instants at which rows are sampled for up to two harder levels of force, falling, in sixteenths as ``ruler``
+    (docs/levels.md). Then a map has the level of each cell: in how many samples it read pressed."""
     row_order: tuple[int, ...] = ()
     """The line that each row is soldered to, counted from 0 (docs/faults.md). (): row i is on line i."""
     column_order: tuple[int, ...] = ()
@@ -112,7 +115,7 @@ class Skin:
     """
     report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and rounded barycenter; ``cells``: a bitmap
-    of the pressed cells.
+    of the pressed cells, or a map of their levels.
     """
     barycenter_bits: int = field(default=4, metadata={"limits": (0, MAX_BARYCENTER_BITS, "")})
     """Fraction bits of x and y with ``report = "barycenter"``, in cells; halves are rounded upward."""
@@ -240,6 +243,11 @@ class Skin:
     def selects_low(self) -> bool:
         """Whether selected rows and pressed columns are low; otherwise they are high."""
         return self.diodes != "row2col"
+
+    @property
+    def levels(self) -> int:
+        """Levels of force that a cell can reach."""
+        return 1 + len(self.harder)
 
     @property
     def reads_rows(self) -> bool:

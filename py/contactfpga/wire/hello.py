@@ -25,9 +25,9 @@ _CHECK = struct.Struct("<I")
 _REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda report: report.code))
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
-_CLOSED, _EXTENT = 0x80, 0x40
-"""Flags of a sheet whose ends meet, and of zones with extents; a reader that does not know one refuses the
-connectivity."""
+_CLOSED, _EXTENT, _LEVELS = 0x80, 0x40, 0x10
+"""Flags of a sheet whose ends meet, and of zones with extents, and the unit of its levels above one, 0 to 3; a reader
+that does not know one refuses the connectivity."""
 
 SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
 STATE_DIGITS = 16
@@ -107,7 +107,7 @@ def encode_hello(
     sheet = _SHEET.pack(
         skin.rows,
         skin.columns,
-        skin.connectivity | _CLOSED * skin.closed | _EXTENT * skin.extent,
+        skin.connectivity | _CLOSED * skin.closed | _EXTENT * skin.extent | _LEVELS * (skin.levels - 1),
         _REPORTS.index(skin.report),
         skin.sheet.barycenter_bits,
         _SENDS.index(skin.send),
@@ -194,9 +194,10 @@ def _hello(fields: dict[int, bytes]) -> Hello:
     sheet = Sheet(
         rows=rows,
         columns=columns,
-        connectivity=connectivity & ~(_CLOSED | _EXTENT),
+        connectivity=connectivity % _LEVELS,
         closed=bool(connectivity & _CLOSED),
         extent=bool(connectivity & _EXTENT),
+        levels=1 + connectivity // _LEVELS % 4,
         report=_REPORTS[report],
         barycenter_bits=bits,
         zone_capacity=capacity,

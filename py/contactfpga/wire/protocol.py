@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,6 +140,8 @@ class Frame:
     whose ends meet, with the cells past the seam (:mod:`contactfpga.zones.around`)."""
     bitmap: np.ndarray | None
     """(rows, columns) bool with ``report = "cells"``; otherwise None."""
+    levels: np.ndarray | None = None
+    """(rows, columns) int64 of the levels of force that each cell reached, 0 at rest; None for a sheet of one level."""
     barycenters: np.ndarray | None = None
     """(n, 3) int64 area, x, y of each zone with ``report = "barycenter"``, x and y in cells / 2^``barycenter_bits``;
     otherwise None."""
@@ -204,6 +207,7 @@ def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Fram
         cells=cells,
         moments=no_records(sheet) if divided or bitmap or not len(records) else records,
         bitmap=records.astype(bool) if bitmap else None,
+        levels=records if sheet.levels > 1 else None,
         barycenters=(records if len(records) else NO_RECORDS) if divided else None,
         extents=extents,
     )
@@ -235,7 +239,7 @@ FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1
 def _check_sums(records: list[list[int]], cells: int, flags: int, widths: Widths) -> None:
     sheet = widths.sheet
     if sheet.report == "cells":
-        carried = sum(map(sum, records))
+        carried = sum(map(bool, itertools.chain.from_iterable(records)))
         possible = carried == cells
     else:
         carried = sum(record[0] for record in records)
@@ -290,9 +294,14 @@ def _records(data: bytes, widths: Widths) -> list[list[int]]:
 def _bitmap(data: bytes, widths: Widths) -> list[list[int]]:
     raw = np.frombuffer(data, np.uint8).reshape(widths.sheet.rows, widths.bitmap_row_bytes)
     bits = np.unpackbits(raw, axis=1, bitorder="little")
-    if bits[:, widths.sheet.columns :].any():
+    carried = widths.sheet.columns * widths.level_bits
+    if bits[:, carried:].any():
         raise PacketError("content", "a bitmap row is filled up with something other than zeros")
-    rows: list[list[int]] = bits[:, : widths.sheet.columns].tolist()
+    cells = bits[:, :carried].reshape(len(bits), -1, widths.level_bits)
+    levels = (cells << np.arange(widths.level_bits, dtype=np.uint8)).sum(axis=2)
+    if levels.max() > widths.sheet.levels:
+        raise PacketError("content", f"a cell has level {levels.max()}; the sheet has {widths.sheet.levels}")
+    rows: list[list[int]] = levels.tolist()
     return rows
 
 

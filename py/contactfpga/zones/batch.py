@@ -50,10 +50,10 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 
 
 @functools.cache
-def zone_dtype_of(divided: bool, extent: bool) -> np.dtype[np.void]:
-    """:data:`ZONE_DTYPE` or, with barycenters, :data:`DIVIDED_ZONE_DTYPE`; of a Skin with ``extent`` also the fields
-    ``box`` and ``box_mm`` of :class:`Zone`, four numbers each."""
-    return np.dtype(_WHICH + dtype_of(divided, extent).descr)
+def zone_dtype_of(divided: bool, extent: bool, levels: bool = False) -> np.dtype[np.void]:
+    """:data:`ZONE_DTYPE` or, with barycenters, :data:`DIVIDED_ZONE_DTYPE`; with the fields that
+    :func:`contactfpga.zones.zone.dtype_of` adds."""
+    return np.dtype(_WHICH + dtype_of(divided, extent, levels).descr)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -161,7 +161,7 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     divided = sheet.report == "barycenter"
     records, windings, extents = _records(items)
     area, x, y = records.T
-    out = np.zeros(len(records), zone_dtype_of(divided, sheet.extent))
+    out = np.zeros(len(records), zone_dtype_of(divided, sheet.extent, sheet.levels > 1))
     which = np.repeat(np.arange(len(frames)), counts)
     out["frame"] = which
     out["time_us"] = frames["time_us"][which]
@@ -171,6 +171,9 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     if not divided:
         out["sum_x"], out["sum_y"] = x, y
     scale = np.full(len(area), 1 << sheet.barycenter_bits) if divided else area
+    if sheet.levels > 1:
+        scale, x, y = np.concatenate([one.weighted for one in items if isinstance(one, Zones)]).T
+        out["pressure"] = scale / area
     if sheet.closed:
         out["winding"] = np.array(around.WINDINGS)[windings]
     nowhere = area == 0

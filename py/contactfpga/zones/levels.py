@@ -12,6 +12,9 @@ import numpy as np
 
 from contactfpga.zones import labels
 
+LASTS = 2
+"""Levels by which parts of a zone rise above the level at which they meet, so that they are contacts of their own."""
+
 
 def label(levels: np.ndarray, connectivity: int, lasts: int) -> np.ndarray:
     """(rows, columns) int64: contact of each cell, from 1; 0 at level 0.
@@ -35,10 +38,24 @@ def _grown(zones: np.ndarray, parts: np.ndarray, levels: np.ndarray, least: int)
     owners = np.unique(zones[lasting] * len(peaks) + parts[lasting]) // len(peaks)  # the zone of each lasting part
     grown = zones.copy()
     for zone in np.unique(owners[1:][owners[1:] == owners[:-1]]):
-        cells, seeds = np.argwhere(zones == zone), np.argwhere((zones == zone) & lasting)
-        near = np.square(cells[:, None] - seeds).sum(axis=2).argmin(axis=1)
-        grown[tuple(cells.T)] = zones.max() + parts[tuple(seeds[near].T)]
+        y, x = np.nonzero(zones == zone)
+        box = slice(y.min(), y.max() + 1), slice(x.min(), x.max() + 1)
+        within = zones[box] == zone
+        grown[box][within] = zones.max() + parts[box].flat[_nearest(within & lasting[box])[within]]
     return grown
+
+
+def _nearest(seeds: np.ndarray) -> np.ndarray:
+    """(rows, columns) int64: place of the nearest seed in row-major order, the first of equally near ones.
+
+    First along each column, then along each row, so that the time is rows x columns x (rows + columns).
+    """
+    (rows, columns), size = seeds.shape, seeds.size
+    y, x = np.arange(rows), np.arange(columns)
+    along = np.square(y[:, None] - y) * size + y * columns  # squared distance, then place
+    by_column = np.where(seeds, along[:, :, None], size**3).min(axis=1)
+    nearest: np.ndarray = (by_column[:, None] + np.square(x[:, None] - x) * size + x).min(axis=2) % size
+    return nearest
 
 
 def moments(levels: np.ndarray, contacts: np.ndarray) -> np.ndarray:

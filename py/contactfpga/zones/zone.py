@@ -16,7 +16,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
-from contactfpga.zones import around, ghosts, labels, motion, tables
+from contactfpga.zones import around, ghosts, labels, levels, motion, tables
 from contactfpga.zones.box import Box, BoxMm, box_mm
 from contactfpga.zones.units import UnitHistory, UnitSamples
 
@@ -47,10 +47,12 @@ _BOXES = [("box", np.int64, (4,)), ("box_mm", np.float64, (4,))]
 
 
 @functools.cache
-def dtype_of(divided: bool, extent: bool) -> np.dtype[np.void]:
+def dtype_of(divided: bool, extent: bool, levels: bool = False) -> np.dtype[np.void]:
     """:data:`DTYPE` or, with barycenters, :data:`DIVIDED_DTYPE`; of a Skin with ``extent`` also the fields ``box`` and
-    ``box_mm`` of :class:`Zone`, four numbers each."""
+    ``box_mm`` of :class:`Zone`, four numbers each; of one with levels of force also ``pressure``."""
     dtype = DIVIDED_DTYPE if divided else DTYPE
+    if levels:
+        return np.dtype([*dtype.descr, ("pressure", np.float64)])
     return np.dtype(dtype.descr + _BOXES) if extent else dtype
 
 
@@ -74,6 +76,7 @@ class Zone:
     """Area of the cells in mm2, measured on the sheet."""
     x_mm: float | None
     """Barycenter along the columns in mm, on the sheet laid flat, within :attr:`Zones.rounding_mm`; column 0 lies at 0.
+    With levels of force a cell counts once for each that it reached.
     On a sheet whose ends meet, x is from 0 to the circumference. None for a zone that is :attr:`winding`, and for one
     without cells, which only a frame flagged ``mismatch`` can have."""
     y_mm: float | None
@@ -88,6 +91,9 @@ class Zone:
     winding: str = ""
     """On a sheet whose ends meet: ``ring`` if a path of the zone's cells closes around the cylinder; ``wound`` if none
     does, but the cells lie on more than two turns. Otherwise ""."""
+    pressure: float | None = None
+    """Mean level of the cells, without a unit: from 1 to the number of the Skin's levels of force, the more the harder
+    it is pressed. None for a Skin of one level."""
     box: Box | None = None
     """First and last column and row of the cells; None unless the Skin has ``extent``."""
     box_mm: BoxMm | None = None
@@ -116,8 +122,18 @@ def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
     if sheet.closed:
         return around.flat(closed_records(frame, sheet), sheet.columns)
     if frame.bitmap is not None:
-        return labels.moments(labels.label(frame.bitmap, sheet.connectivity))
+        return labels.moments(cell_labels(frame, sheet))
     return frame.moments if frame.barycenters is None else frame.barycenters
+
+
+def cell_labels(frame: Frame, sheet: Sheet) -> np.ndarray:
+    """(rows, columns) int64: zone of each cell, from 1; 0: none. Of a map of levels the contacts are the zones."""
+    assert frame.bitmap is not None
+    if sheet.closed:
+        return around.label(frame.bitmap, sheet.connectivity)[0]
+    if frame.levels is not None:
+        return levels.label(frame.levels, sheet.connectivity, levels.LASTS)
+    return labels.label(frame.bitmap, sheet.connectivity)
 
 
 def closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
@@ -241,6 +257,12 @@ class Zones(Sequence[Zone]):
         return self.frame.bitmap
 
     @property
+    def levels(self) -> np.ndarray | None:
+        """(rows, columns) int64 with levels of force (docs/levels.md): how many of them each cell reached, 0 at rest;
+        otherwise None."""
+        return self.frame.levels
+
+    @property
     def ghost_cells(self) -> np.ndarray | None:
         """(rows, columns) bool with ``report = "cells"``: cells that may be ghosts (:mod:`contactfpga.zones.ghosts`);
         otherwise None."""
@@ -275,10 +297,14 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def _labels(self) -> np.ndarray:
-        assert self.frame.bitmap is not None
-        if self.sheet.closed:
-            return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
-        return labels.label(self.frame.bitmap, self.sheet.connectivity)
+        return cell_labels(self.frame, self.sheet)
+
+    @functools.cached_property
+    def weighted(self) -> np.ndarray:
+        """(n, 3) int64 of each of :attr:`records`, with levels of force: sum of the levels, and of columns and rows
+        times the level."""
+        assert self.frame.levels is not None
+        return levels.moments(self.frame.levels, self._labels)[:, 1:]
 
     @property
     def rounding_mm(self) -> tuple[float, float]:
@@ -293,7 +319,7 @@ class Zones(Sequence[Zone]):
     def array(self) -> np.ndarray:
         """(n,) read-only structured array of :func:`dtype_of`, with NaN for None; without sums for ``report =
         "barycenter"``."""
-        dtype = dtype_of(self.frame.barycenters is not None, self.sheet.extent)
+        dtype = dtype_of(self.frame.barycenters is not None, self.sheet.extent, self.sheet.levels > 1)
         array = np.zeros(len(self), dtype)
         for row, zone in zip(array, self._zones):
             for name in dtype.names or ():
@@ -316,7 +342,10 @@ class Zones(Sequence[Zone]):
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
         make = self._exact if self.frame.barycenters is None else self._divided
         suspects = self.suspects if self.sheet.ghosts else itertools.repeat(False)
-        zones = [make(area, x, y, ghost) for (area, x, y), ghost in zip(self.records.tolist(), suspects)]
+        if self.frame.levels is None:
+            zones = [make(area, x, y, ghost) for (area, x, y), ghost in zip(self.records.tolist(), suspects)]
+        else:
+            zones = [self._weighed(*sums) for sums in np.hstack([self.records, self.weighted]).tolist()]
         for index, winding in enumerate(self.windings if self.sheet.closed else ()):
             if winding:
                 zones[index] = dataclasses.replace(zones[index], x_mm=None, point_mm=None, normal=None, winding=winding)
@@ -328,6 +357,10 @@ class Zones(Sequence[Zone]):
 
     def _exact(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
         return self._placed(area, sum_x, sum_y, (sum_x / area, sum_y / area) if area else None, ghost)
+
+    def _weighed(self, area: int, sum_x: int, sum_y: int, weight: int, x: int, y: int) -> Zone:
+        zone = self._placed(area, sum_x, sum_y, (x / weight, y / weight), False)
+        return dataclasses.replace(zone, pressure=weight / area)
 
     def _divided(self, area: int, x: int, y: int, ghost: bool) -> Zone:
         steps = 1 << self.sheet.barycenter_bits
@@ -428,6 +461,8 @@ class Zones(Sequence[Zone]):
         values["zones"] = [self._as_dict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]
+            if self.levels is not None:
+                values["levels"] = self.levels.tolist()
             if self.sheet.ghosts:
                 values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
         return values
@@ -436,6 +471,8 @@ class Zones(Sequence[Zone]):
         values = dataclasses.asdict(zone)
         if not self.sheet.closed:
             del values["winding"]
+        if self.sheet.levels == 1:
+            del values["pressure"]
         if not self.sheet.extent:
             del values["box"], values["box_mm"]
         return values

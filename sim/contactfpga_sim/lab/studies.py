@@ -32,7 +32,11 @@ _ALL = (
         title="Resistive cells read by the time in which a column falls",
         page="cell.md",
         minutes=1,
-        sections=tables("levels wrong", materials=Section("tables:materials_table", sample="tables:materials_table")),
+        sections=tables(
+            "levels wrong",
+            materials=Section("tables:materials_table", sample="tables:materials_table"),
+            board=Section("tables:board_table", page="levels.md", sample="tables:board_table"),
+        ),
     ),
     Study(
         "chart",

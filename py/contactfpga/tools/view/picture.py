@@ -44,14 +44,16 @@ CIRCLE, TRAIL, PUSH, AXIS = (
 
 
 def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
-    """(n, 3) uint8, row by row. ``truth``: closed cells of a virtual board."""
+    """(n, 3) uint8, row by row; with levels of force in shades. ``truth``: closed cells of a virtual board."""
     shape = (zones.sheet.rows, zones.sheet.columns)
     colors = np.empty((*shape, 3), np.uint8)
     colors[:] = OPEN
     if truth is not None:
         colors[truth] = TRUE
     if zones.cells is not None:
-        colors[zones.cells] = REPORTED
+        share = zones.cells if zones.levels is None else zones.levels / zones.sheet.levels
+        shades = np.array(OPEN) + np.multiply.outer(share, np.subtract(REPORTED, OPEN))
+        colors[zones.cells] = shades[zones.cells].round()
         ghosts = zones.ghost_cells
         if ghosts is not None:
             colors[ghosts & zones.cells] = GHOST

@@ -57,6 +57,25 @@ def levels_table() -> str:
     return writer.table_of(rows)
 
 
+def board_table() -> str:
+    """Largest errors of the levels of the example with several, by leakage."""
+    file = examples() / "levels.toml"
+    skin, circuit, cell = Skin.load(file), load_circuit(file) or Circuit(), (load_cover(file) or Cover()).cell
+    assert cell is not None
+    lines = skin.row_lines, skin.columns
+    one_s = falling.ruler_s(circuit, *lines) / falling.SIXTEENTHS
+    rows = [["level", "force", "resistance", "sample", *(f"error at {leak:g} µA" for leak in LEAKS_UA)]]
+    for level, ruler in enumerate(skin.derived.rulers):
+        force = cell.level_n * 4.0**level
+        ohm = float(cell.ohm(np.array(force)))
+        errors = [float(falling.error_octaves(circuit, *lines, ohm, leak)[0]) for leak in LEAKS_UA]
+        sample = f"{ruler}/16, {1e6 * ruler * one_s:.1f} us"
+        rows.append(
+            [str(level + 1), f"{force:.2f} N", f"{ohm / 1e3:.1f} kΩ", sample, *(f"{one:.2f}" for one in errors)]
+        )
+    return writer.table_of(rows)
+
+
 def wrong_table() -> str:
     """Readings of the virtual board that disturbances turned, of all readings."""
     rows = [["scene", "cells pressed", *DISTURBED]]

@@ -290,8 +290,13 @@ class Facts:
         else:
             sums = self.area_bits + self.sum_x_bits + self.sum_y_bits
             record = sums + (self.area_bits if self.skin.closed else 0) + sum(self.extent_bits)
-            width = record if self.zones else self.columns
+            width = record if self.zones else self.columns * self.level_bits
         return -(-width // 8)
+
+    @property
+    def level_bits(self) -> int:
+        """Bits of a cell on the wire, 2 with levels."""
+        return 1 if self.skin.levels == 1 else 2
 
     @functools.cached_property
     def fingerprint(self) -> bytes:

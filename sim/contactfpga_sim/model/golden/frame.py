@@ -23,7 +23,7 @@ class Items:
 
     scan: Scan
     cells: np.ndarray
-    """(R, C) bool: debounced cells."""
+    """(R, C) bool: debounced cells, or integers: their levels."""
     records: list[tuple[int, int]]
     """(cycle, data) of every item, in order."""
     end: int
@@ -104,7 +104,7 @@ class Packer:
     def _trailer(self, items: Items) -> bytes:
         facts = self._facts
         overflow = len(items.records) > facts.capacity
-        cells = int(items.cells.sum())
+        cells = int(np.count_nonzero(items.cells))
         zones = len(items.records) if facts.zones else 0
         counted = 24 + 8 + 3 + facts.area_bits + facts.zones_bits
         room = -(-(counted + 4) // 8) * 8 - counted

@@ -26,7 +26,7 @@ def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
     report = ("moments", "cells", "barycenter").index(skin.report)
     fraction_bits = skin.barycenter_bits if facts.divided else 0
     on_change, no_diodes = skin.send == "on_change", skin.diodes == "none"
-    joins = skin.connectivity + (128 if skin.closed else 0) + (64 if skin.extent else 0)
+    joins = skin.connectivity + 128 * skin.closed + 64 * skin.extent + 16 * (skin.levels - 1)
     head = (skin.rows, skin.columns, joins, report, fraction_bits, on_change)
     fixed = _field(SHEET, bytes(map(int, head)) + struct.pack("<HBB", skin.zone_capacity, no_diodes, skin.guard))
     rest = _field(PITCH, struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm))

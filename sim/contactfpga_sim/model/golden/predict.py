@@ -165,7 +165,7 @@ class Pipeline:
         """Hand over a taken row, through the debounce if it was driven (``alone``); returns the cycle."""
         cycle = max(taken + self._late * alone, self._free, earliest)
         self._handed = cycle
-        self._trace.rows.append((cycle, _word(cells), last))
+        self._trace.rows.append((cycle, _word(cells, self._facts.level_bits), last))
         return cycle
 
     def keep_busy(self, until: int) -> None:
@@ -190,7 +190,7 @@ class Pipeline:
             ]
             end = handed[-1] + work.end
         else:
-            records = [(cycle, _word(row)) for cycle, row in zip(handed, taken, strict=True)]
+            records = [(cycle, _word(row, facts.level_bits)) for cycle, row in zip(handed, taken, strict=True)]
             end = handed[-1] + 3
         self._trace.records += [(cycle, data, False) for cycle, data in records] + [(end, 0, True)]
         self._scanned.append(one)
@@ -262,8 +262,8 @@ def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
     return zone.sum_y + (places[zone.row] - zone.row) * zone.area
 
 
-def _word(cells: np.ndarray) -> int:
-    return int(np.sum(1 << np.nonzero(cells)[0].astype(object)))
+def _word(cells: np.ndarray, width: int) -> int:
+    return sum(int(cell) << width * column for column, cell in enumerate(cells))
 
 
 TICK_US = 1000

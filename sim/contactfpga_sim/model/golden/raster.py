@@ -62,14 +62,14 @@ def _asked_before(facts: Facts, slot: int) -> int:
 def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
     """The first ``count`` scans; requests are in order of reception."""
     result = []
-    for index, (ahead, _) in enumerate(_instants(facts, timeline, requests, count)):
+    for index, (early_by, _) in enumerate(_instants(facts, timeline, requests, count)):
         slots = row_slots(facts, index)
         begin = strobe(facts, slots[0])
         late = _asked_before(facts, slots[0])
         early = _asked_before(facts, slots[0] - facts.row_lines) if index else 0
         result.append(
             Scan(
-                cells=np.array([_read(facts, timeline, slot, ahead)[: facts.columns] for slot in slots]) & ~facts.mask,
+                cells=_cells(facts, timeline, slots, early_by),
                 offered=[strobe(facts, slot) + 1 for slot in slots],
                 stuck=int(np.sum((_stuck(facts, timeline, index)[: facts.columns]) & ~facts.mask.all(axis=0))),
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
@@ -81,25 +81,41 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
     return result
 
 
-def _instants(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[tuple[int, bool]]:
-    """By frame the clocks by which samples precede the settle time's end, and whether rows are checked."""
+def _cells(facts: Facts, timeline: Timeline, slots: Iterable[int], early_by: Sequence[int]) -> np.ndarray:
+    read = [[_read(facts, timeline, slot, ahead)[: facts.columns] for slot in slots] for ahead in early_by]
+    return (np.array(read) & ~facts.mask).sum(axis=0, dtype=bool if facts.skin.levels == 1 else int)
+
+
+def _instants(
+    facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int
+) -> list[tuple[tuple[int, ...], bool]]:
+    """By frame the clocks by which the sample of each level precedes the settle time's end, and whether rows are
+    checked."""
     slots = [row_slots(facts, frame)[0] for frame in range(count)]
     if not facts.skin.ruler:
         early = [early_clocks(facts, requests, _asked_before(facts, slot)) for slot in slots]
-        return [(clocks, not clocks) for clocks in early]
+        return [((clocks,), not clocks) for clocks in early]
     lines, found = FaultyLines(facts), []
     for frame, slot in enumerate(slots):
         start = facts.row_shift + (slot - 1) * facts.row_clocks
-        asked = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
-        level = asked[-1] if asked and 1 <= asked[-1] <= 255 else facts.skin.ruler
+        values = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
+        asked = [_sixteenths(facts, values, level) for level in range(facts.skin.levels)]
         ignored = lines.open_columns | facts.mask.all(axis=0)
         fallen = next(
             (clocks for clocks in range(1, facts.settle + 1) if _fell(facts, timeline, start + clocks - 1, ignored)), 0
         )
-        instant = max(facts.first_sample, fallen * level // 16) if fallen else facts.settle
-        found.append((max(0, facts.settle - instant), not fallen or level >= 24))
+        instants = [max(facts.first_sample, fallen * each // 16) if fallen else facts.settle for each in asked]
+        found.append((tuple(max(0, facts.settle - each) for each in instants), not fallen or asked[0] >= 24))
         lines.check("columns", ~_read(facts, timeline, slot - 1)[: facts.columns], _renews(facts, frame))
     return found
+
+
+def _sixteenths(facts: Facts, values: Sequence[int], level: int) -> int:
+    """Sixteenths of the ruler's time for a level, after commands with these values: with levels each names its own."""
+    if facts.skin.levels > 1:
+        values = [value % 256 for value in values if value // 256 == level]
+    usual = (facts.skin.ruler, *facts.skin.harder)[level]
+    return values[-1] if values and 1 <= values[-1] <= 255 else usual
 
 
 def _fell(facts: Facts, timeline: Timeline, cycle: int, ignored: np.ndarray) -> bool:

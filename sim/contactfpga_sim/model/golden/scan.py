@@ -20,7 +20,8 @@ class Scan:
     """One scan of the sheet, which becomes one frame."""
 
     cells: np.ndarray
-    """(R, C) bool: raw samples, masked switches removed."""
+    """(R, C) raw samples, masked switches removed: bool, or of a board with levels the number of samples, from 0, in
+    which each cell read pressed."""
     offered: list[int]
     """Cycle in which each row is offered to the next stage."""
     stuck: int

@@ -109,7 +109,7 @@ class Trace:
 
     cycles: int
     rows: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, cells, last) of rows handed to the labeller; bit c is column c."""
+    """(cycle, cells, last) of rows handed to the labeller; bit c is column c, or bits 2 c and 2 c + 1 are its level."""
     records: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
     """(cycle, data, end): a zone's exact moments or a bitmap row, in bit fields as on the wire, or an end mark."""
     items: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)

@@ -9,6 +9,7 @@ from contactfpga_sim.verify.proofs import (
     dual,
     label,
     label_serial,
+    levels,
     link,
     pack,
     precharge,
@@ -34,6 +35,7 @@ from contactfpga_sim.verify.proofs.case import ProofCase
 CASES: tuple[ProofCase, ...] = (
     *scan.CASES,
     *raster_guard.CASES,
+    *levels.CASES,
     *precharge.CASES,
     *reversal.CASES,
     *reversal_frames.CASES,

@@ -21,6 +21,8 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     skin = bare_skin(board, "what one frame shows")
     if not skin.ruler:
         raise ContactFPGAError(f"{board.port} has switches, which have no rest level; --rest needs a Skin with a ruler")
+    if skin.harder:
+        raise ContactFPGAError(f"{board.port} tells levels of force; --rest needs a board built without `harder`")
     if not args.json:
         terminal.say(f"Leave {board.port} untouched until its rest levels are known.")
     rest, end = Rest((skin.rows, skin.columns)), []

@@ -1,0 +1,31 @@
+"""Levels of force: several samples of a row, of which each is a threshold."""
+
+from typing import Any
+
+from amaranth.hdl import Cat, Module, Signal, Value
+from amaranth.lib import wiring
+
+from contactfpga_hdl.scan.ruler import Ruler
+from contactfpga_hdl.util.bits import popcount
+
+
+def count_levels(m: Module, scanner: wiring.Component, slots: Any, columns: Value, sample: Any) -> Value:
+    """The level of each column, as in a row's ``cells``: in how many samples it read pressed.
+
+    ``columns``: levels of the column pins, two clocks late. The lightest level is that of ``sample``, a raster scan's;
+    each other one has a sample of its own, whose ruler is added to ``sample.harder``.
+    """
+    skin, derived = scanner.skin, scanner.derived
+    read = [sample.read[: skin.columns]]
+    for level in range(1, skin.levels):
+        ruler = Ruler(m, derived, scanner.moves, scanner.clocks, slots.begins_rows, level)
+        sample.harder.append(ruler)
+        now, kept = (Signal(skin.columns, name=f"{name}_{level}") for name in ("level_now", "level_kept"))
+        live = columns[: skin.columns]
+        with m.If(slots.clock == ruler.clock + 1):  # two synchronizer stages after the sample
+            m.d.comb += now.eq(~live if skin.selects_low else live)
+        with m.Else():
+            m.d.comb += now.eq(kept)
+        m.d.sync += kept.eq(now)
+        read.append(now)
+    return Cat(Value.cast(popcount(pressed))[: derived.level_bits] for pressed in zip(*read))
