@@ -180,12 +180,12 @@ def test_finite_elements_are_placed_better_than_by_the_barycenter(fitted, tilts)
     assert one.covered > 0.9
 
 
-def test_touches_in_place_are_not_flagged_and_slides_are(fitted, monkeypatch):
+def test_touches_in_place_are_not_flagged_and_slides_and_fast_rolls_are(fitted, monkeypatch):
     monkeypatch.setattr(scores, "table", lambda levels=(1.0,): fitted)
     still = scores.mean(scores.grown(scores.GROWING[0], number)[-1] for number in range(40))
-    slid = scores.mean(scores.moved(scores.MOVING[1], number)[-1] for number in range(6))
+    slid, rolled = (scores.mean(scores.moved(case, number)[-1] for number in range(6)) for case in scores.MOVING[1::4])
     assert still.ratio + still.half < 0.7
-    assert (still.moved, slid.moved) == (0.0, 1.0)
+    assert (still.moved, slid.moved, rolled.moved) == (0.0, 1.0, 1.0)
 
 
 def test_the_command_writes_what_a_tracker_takes(tmp_path, run):

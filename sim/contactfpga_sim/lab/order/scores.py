@@ -75,7 +75,8 @@ class Case:
     speed_mm_s: float = 0.0
     """Speed at which the contact moves by :data:`FAR_MM`, on a straight line at any angle."""
     rises: bool = False
-    """Whether it moves from the first touch on and not only once its force has risen."""
+    """Whether it moves from when the first cell closes and not only once its force has risen. What moves before that
+    closes no cell."""
 
 
 FAR_MM, WAIT_S = 20.0, 0.02
@@ -245,14 +246,18 @@ def moved(case: Case, number: int) -> Timeline:
     """One outcome, over all frames; :attr:`Outcome.moved` is that of the last."""
     scene, rng = drawn(case, number)
     (contact,) = scene.contacts
-    start_s = 0.0 if case.rises else scene.settled_s + WAIT_S
-    end_s, step_s = start_s + FAR_MM / case.speed_mm_s, min(STEP_S, STEP_MM / case.speed_mm_s)
     angle = rng.uniform(0, 2 * math.pi)
     middle = (contacts.at(value, 0.0) for value in (contact.x_mm, contact.y_mm))
-    x, y = (
-        contacts.Track((start_s, end_s), (at - FAR_MM / 2 * turn, at + FAR_MM / 2 * turn))
-        for at, turn in zip(middle, (math.cos(angle), math.sin(angle)))
-    )
+    ends = [
+        (at - FAR_MM / 2 * turn, at + FAR_MM / 2 * turn) for at, turn in zip(middle, (math.cos(angle), math.sin(angle)))
+    ]
+    begins = dataclasses.replace(contact, x_mm=ends[0][0], y_mm=ends[1][0])
+    first_s = float(places.closings(dataclasses.replace(scene, contacts=(begins,)), SKIN, cover()).min())
+    start_s = first_s if case.rises else scene.settled_s + WAIT_S
+    if math.isinf(start_s):
+        return [None]
+    end_s, step_s = start_s + FAR_MM / case.speed_mm_s, min(STEP_S, STEP_MM / case.speed_mm_s)
+    x, y = (contacts.Track((start_s, end_s), both) for both in ends)
     cells = Scene((dataclasses.replace(contact, x_mm=x, y_mm=y),), scene.drawn).on(SKIN, cover())
     tracker, found = Tracker(places=table()), []
     for seconds in np.arange(step_s, max(scene.settled_s, end_s) + WAIT_S, step_s).tolist():
