@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.growth import Closing, Growth, Moments
-from contactfpga.tracking.places import Places, Row
+from contactfpga.tracking.places import SPREADS, TOO_FEW, Places, Row, Spread
 from contactfpga_sim.model.scenes.contacts import M
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -27,11 +28,8 @@ FITTED, FLAT = ("finger", "bumper"), "edge"
 CELLS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 14, 18, 23, 30, 40, 55, 75, 100)
 """Least cells of a row."""
 
-TOO_FEW = 2
-"""Cells of which a place is the barycenter: where no third one closes soon, the middle of two is the better place."""
-
-FEWEST = 100
-"""States from which a row is fitted."""
+FEWEST, FEWEST_SETTLED = 100, 40
+"""States from which a row is fitted, and a spread of settled ones. With fewer these have that of the others."""
 
 CHI2_95 = -2 * math.log(0.05)
 """Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
@@ -44,6 +42,17 @@ ON_SHEET = 0.02
 
 FLATTEST = 0.95
 """Share of the states of flat bodies whose times say nothing."""
+
+ENDLESS_US = 10**9
+"""Rest of a settled touch."""
+
+LEAST_MM2 = 1e-6
+"""Added to squared errors, so that each has a logarithm."""
+
+ROUNDS = 60
+"""Weighted least squares that lead to a line of quantiles."""
+
+NO_SPREADS = (Spread(0.0, 0.0),) * SPREADS
 
 Place = tuple[float, float]
 
@@ -80,7 +89,7 @@ def crossings(times: Floats, forces: Floats, thresholds: Floats) -> Floats:
 
 def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
     """The record of a single contact after each scan, one every ``period_us``, in which some of (..., rows, columns)
-    cells close. Cells with levels close once at each."""
+    cells close, and once more when it is settled. Cells with levels close once at each."""
     scans = np.ceil(closing_s * 1e6 / period_us - 1e-9)
     growth = Growth()
     for scan in np.unique(scans[np.isfinite(scans)]).tolist():
@@ -88,11 +97,20 @@ def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
         closed = Moments(len(rows), int(columns.sum()), int(rows.sum()))
         growth.closings.append(Closing(round(scan * period_us), closed))
         yield growth
+    if growth.closings:
+        growth.rest_us = ENDLESS_US
+        yield growth
 
 
-Draw = tuple[int, float, list[Floats], Floats]
-"""A state of a simulated touch: number of cells; mean time between closings in us; what the factors of a row multiply;
-and the true place, both from the barycenter in mm."""
+class Touch(NamedTuple):
+    """A simulated touch by a single contact."""
+
+    closing_s: Floats
+    """Closing times, see :func:`closings`."""
+    place: Place
+    """The place of the contact's part on the sheet."""
+    whole: bool
+    """Whether the contact's own place is the same."""
 
 
 def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tuple[float, ...] = (1.0,)) -> Places:
@@ -101,28 +119,42 @@ def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tupl
     Raises CoverError for the model ``patch``. ``levels``: closing forces of each cell over the switch's.
     """
     skin = dataclasses.replace(skin, closed=False)
-    grew = [one for family in FITTED for one in draws(family, skin, cover, count, seed, levels)]
-    paces = [pace_us for cells, pace_us, _, _ in draws(FLAT, skin, cover, count, seed, levels) if cells > 1]
+    seen = {family: touched(family, skin, cover, count, seed, levels) for family in (*FITTED, FLAT)}
+    grew = [one for family in FITTED for touch in seen[family] if touch.whole for one in draws(touch, skin)]
+    paces = [pace_us for touch in seen[FLAT] if touch.whole for cells, pace_us, _, _ in draws(touch, skin) if cells > 1]
     least_us = float(np.quantile(paces or [0.0], FLATTEST))
     rows = [row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grew))]
-    return Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, tuple(rows))
+    # The variances of this table number its spreads.
+    numbers = tuple(Spread(float(number), 0.0) for number in range(SPREADS))
+    table = Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, tuple(rows), numbers)
+    return dataclasses.replace(table, spreads=_spreads([_states(table, found, skin) for found in seen.values()]))
 
 
-def draws(
+def touched(
     family: str, skin: Skin, cover: Cover, count: int, seed: int, levels: tuple[float, ...] = (1.0,)
-) -> Iterator[Draw]:
-    """The states of touches of a family by a single contact that lies on the sheet."""
-    pitches = skin.pitch_x_mm, skin.pitch_y_mm
-    # A table with a single factor moves a place by what that factor multiplies.
-    units = [Places(*pitches, 0.0, (Row(1, *factors, 0.0, 0.0, 1e9),)) for factors in ((1.0, 0.0), (0.0, 1.0))]
+) -> list[Touch]:
+    found = []
     for scene in touches(family, count, seed, skin, cover):
         (place,), (on_sheet, *_) = (whereabouts(scene, part)(math.inf) for part in (None, skin))
-        if math.dist(place, on_sheet) > ON_SHEET * pitches[0]:
-            continue
-        for growth in grown(closings(scene, skin, cover, levels), frame_us(skin)):
-            count, at = middle(growth, skin.sheet)
-            moves = [np.subtract(unit.of(growth, *at, count)[:2], at) for unit in units]
-            yield count, growth.span_us / max(1, count - 1), moves, np.subtract(place, at)
+        whole = math.dist(place, on_sheet) <= ON_SHEET * skin.pitch_x_mm
+        found.append(Touch(closings(scene, skin, cover, levels), on_sheet, whole))
+    return found
+
+
+Draw = tuple[int, float, list[Floats], Floats]
+"""A state of a simulated touch: number of cells; mean time between closings in us; what the factors of a row multiply;
+and the true place, both from the barycenter in mm."""
+
+
+def draws(touch: Touch, skin: Skin) -> Iterator[Draw]:
+    pitches = skin.pitch_x_mm, skin.pitch_y_mm
+    # A table with a single factor moves a place by what that factor multiplies.
+    units = [Places(*pitches, 0.0, (Row(1, *factors, 1e9),), NO_SPREADS) for factors in ((1.0, 0.0), (0.0, 1.0))]
+    for growth in grown(touch.closing_s, frame_us(skin)):
+        count, at = middle(growth, skin.sheet)
+        moves = [np.subtract(unit.of(growth, *at, count)[:2], at) for unit in units]
+        if not growth.settled:
+            yield count, growth.span_us / max(1, count - 1), moves, np.subtract(touch.place, at)
 
 
 def middle(growth: Growth, sheet: Sheet) -> tuple[int, Place]:
@@ -143,14 +175,49 @@ def _row(first: int, end: int, least_us: float, grew: list[Draw]) -> Row | None:
     _, paces_us, moves, off = (np.array(column) for column in zip(*here))
     told = paces_us > least_us
     if first <= TOO_FEW or not told.any():
-        return Row(first, 0.0, 0.0, _variance(off), _variance(off), 0.0)
+        return Row(first, 0.0, 0.0, 0.0)
     flat = moves[told].transpose(0, 2, 1).reshape(-1, 2)
     linear, square = factors = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0]
-    moved = factors @ moves[told]
-    reach_mm = float(np.quantile(np.hypot(*moved.T), FARTHEST))
-    return Row(first, float(linear), float(square), _variance(off[told] - moved), _variance(off), reach_mm)
+    reach_mm = float(np.quantile(np.hypot(*(factors @ moves[told]).T), FARTHEST))
+    return Row(first, float(linear), float(square), reach_mm)
 
 
-def _variance(off: Floats) -> float:
-    """Variance along each axis of which 95 % of (n, 2) offsets keep the limit."""
-    return float(np.quantile((off**2).sum(axis=1), 0.95) / CHI2_95)
+def _states(table: Places, found: list[Touch], skin: Skin) -> Floats:
+    """(n, 4) number of the spread, logarithms of the number of cells and of the squared error over mm2, and weight of
+    all states of a family's touches: those that settled weigh as much as all others."""
+    states = []
+    for touch in found:
+        for growth in grown(touch.closing_s, frame_us(skin)):
+            count, at = middle(growth, skin.sheet)
+            x_mm, y_mm, number, _ = table.of(growth, *at, count)
+            off_mm2 = math.dist((x_mm, y_mm), touch.place) ** 2
+            states.append((number, math.log(count), math.log(off_mm2 + LEAST_MM2), growth.settled))
+    number, cells, off, settled = np.array(states).reshape(-1, 4).T
+    settled = settled > 0
+    weights = np.where(settled, 1 / max(1, settled.sum()), 1 / max(1, (~settled).sum()))
+    return np.column_stack([number, cells, off, weights])
+
+
+def _spreads(families: list[Floats]) -> tuple[Spread, ...]:
+    number, cells, off, weight = np.concatenate(families).T
+    found: list[Spread] = []
+    for kind in range(SPREADS):
+        here = number == kind
+        if here.sum() < (FEWEST_SETTLED if kind >= SPREADS // 2 else TOO_FEW):
+            found.append(found[kind - SPREADS // 2] if kind >= SPREADS // 2 else found[-1])
+            continue
+        level, power = quantile_line(cells[here], off[here], weight[here])
+        found.append(Spread(math.exp(level) / CHI2_95, power))
+    return tuple(found)
+
+
+def quantile_line(x: Floats, y: Floats, weights: Floats, share: float = 0.95) -> tuple[float, float]:
+    """Level and slope of the line that lies above a share of weighted points (x, y), at whatever x: the one of the
+    least sum of distances, which count ``share`` for points above it and 1 - ``share`` below."""
+    terms = np.column_stack([np.ones_like(x), x])
+    line = np.array([np.quantile(y, share), 0.0])
+    for _ in range(ROUNDS):
+        off = y - terms @ line
+        each = weights * np.where(off > 0, share, 1 - share) / np.maximum(np.abs(off), 1e-3)
+        line = np.linalg.lstsq(terms * np.sqrt(each)[:, None], y * np.sqrt(each), rcond=1e-9)[0]
+    return float(line[0]), float(line[1])
