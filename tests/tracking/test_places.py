@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tracker_frames import moments, pressed
 
-from contactfpga import Places, Skin, Tracker
+from contactfpga import Places, Skin, Tracker, Zones
 from contactfpga.design import kits
 from contactfpga.design.cover import load_cover, medium
 from contactfpga.tracking.places import PlacesError, Row, Spread
@@ -65,6 +65,7 @@ def test_the_place_is_the_weighted_mean_of_the_cells(rng):
         "place_mm",
         "place_cov_mm2",
         "moved",
+        "missed",
     }
 
 
@@ -101,6 +102,16 @@ def test_a_contact_at_rest_has_the_spread_of_settled_ones(steps, rising):
     late = end + 2 * max(end, 5000)
     for more, expected in (([], rising), ([(late, whole)], rising), ([(late + 1, whole)], rising / 2)):
         assert variance(frames + more) == pytest.approx(expected)
+
+
+def test_frames_that_a_contact_misses_are_counted_over_the_wrap():
+    """From its first frame on: gaps of 1 and 3, each beside one that is the next."""
+    tracker, shown, said = Tracker(places=TABLE), np.zeros((16, 16), bool), []
+    for time_us, sequence in enumerate((7, 249, 250, 252, 253, 1, 1)):
+        shown[8, 8] = time_us > 0
+        frame = pressed(time_us, shown, skin=SKIN).frame
+        said += tracker.update(Zones(dataclasses.replace(frame, sequence=sequence), SKIN.sheet)).active
+    assert [track.missed for track in said] == [0, 0, 1, 1, 4, 4]
 
 
 def test_a_zone_of_parts_that_met_may_be_any_of_them():

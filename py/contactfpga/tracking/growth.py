@@ -61,6 +61,8 @@ class Growth:
         """Whether a cell that had closed is open for longer than it bounces."""
         self.rest_us = 0
         """Time since the zone last changed."""
+        self.missed = 0
+        """Frames since the first closing that were not given."""
         self._changed_us = 0
         self.apart = 0.0, 0.0
         """Variances along columns and rows, in cells, of the middles of the parts that met in the zone, by their
@@ -120,6 +122,7 @@ class Growth:
         self._opened_us = min(open_since, default=0)
         self._opened = self._opened.plus(other._opened.shifted(shift))
         self.moved |= other.moved
+        self.missed = max(self.missed, other.missed)
 
     def _has(self, change: Moments) -> bool:
         """Whether a change is a single cell that is known to have closed."""

@@ -72,6 +72,8 @@ class Case:
     """Share of the frames with a change that are lost, where a board sends no others."""
     sensor: str = "switches"
     """``switches``; ``levels``: cells with :data:`LEVELS`; ``analog``: an 8-bit array read in one frame."""
+    early: bool = False
+    """Whether the time runs from the first crossing of the lightest level and not from when a switch would close."""
     speed_mm_s: float = 0.0
     """Speed at which the contact moves by :data:`FAR_MM`, on a straight line at any angle."""
     rises: bool = False
@@ -100,8 +102,10 @@ GROWING = (
     Case("a finger, a fifth of the frames lost", lost=0.2),
 )
 TIMED = (
-    *(Case(f"{hz:,.0f} frames per second", body=FIRM, hz=hz) for hz in RATES_HZ),
+    *(Case(f"{hz:,.0f} frames per second", body=FIRM, hz=hz) for hz in RATES_HZ[:-1]),
+    Case(f"{RATES_HZ[-1]:,.0f} frames per second (reversal)", body=FIRM, hz=RATES_HZ[-1]),
     Case("five levels per cell", body=FIRM, sensor="levels"),
+    Case("five levels, from their own first crossing", body=FIRM, sensor="levels", early=True),
     Case("8-bit analog array", body=FIRM, sensor="analog"),
 )
 MOVING = tuple(
@@ -197,7 +201,7 @@ def grown(case: Case, number: int) -> Timeline:
         return _analog(scene, where(math.inf)[0], float(closing_s.min()))
     closing_s = closing_s + rng.uniform(0, 1 / case.hz) + rng.uniform(0, max(case.late_s, 1e-12), closing_s.shape)
     if case.sensor == "levels":
-        return _levels(closing_s, case.hz, where(math.inf)[0])
+        return _levels(closing_s, case, where(math.inf)[0])
     if case.bounce_s:
         opens, closes = np.sort(rng.uniform(0, case.bounce_s, (2, *closing_s.shape[1:])), axis=0)
         closing_s = np.concatenate([closing_s, closing_s + opens, closing_s + closes])
@@ -205,27 +209,29 @@ def grown(case: Case, number: int) -> Timeline:
     kept = [one for one in shown[:-1] if rng.random() >= case.lost] + shown[-1:]
     tracker = Tracker(places=table())
     said = [tracker.update(one) for one in kept]
-    return _at([one.time_us for one in said], lambda n: averaged(judged(said[n], where(said[n].time_us / 1e6))))
+    times_us = [one.time_us for one in said]
+    return _at(times_us, lambda n: averaged(judged(said[n], where(said[n].time_us / 1e6))), *times_us[:1])
 
 
-def _at(times_us: list[int], outcome: Callable[[int], Outcome | None]) -> Timeline:
-    """The outcome of the last of rising times before each end."""
-    if not times_us:
+def _at(times_us: list[int], outcome: Callable[[int], Outcome | None], first_us: float = math.inf) -> Timeline:
+    """The outcome of the last of rising times before each end, by the time since the first closing."""
+    if math.isinf(first_us):
         return [None] * (len(AFTER_MS) + 1)
-    ends = [bisect.bisect_right(times_us, times_us[0] + 1e3 * after) for after in AFTER_MS]
+    ends = [bisect.bisect_right(times_us, first_us + 1e3 * after) for after in AFTER_MS]
     return [outcome(end - 1) for end in (*ends, len(times_us))]
 
 
-def _levels(closing_s: Floats, hz: float, place: Place) -> Timeline:
+def _levels(closing_s: Floats, case: Case, place: Place) -> Timeline:
     """A single contact of cells with levels, each crossing of which counts as a closing."""
+    first_s = closing_s.min() if case.early else closing_s[LEVELS.index(1.0)].min()
     times_us, found = [], []
-    for growth in places.grown(closing_s, 1e6 / hz):
+    for growth in places.grown(closing_s, 1e6 / case.hz):
         cells, middle = places.middle(growth, SHEET)
         one = table(LEVELS).of(growth, *middle, cells)
         off = math.dist(one[:2], place)
         times_us.append(growth.closings[-1].time_us)
         found.append(Outcome(off, math.dist(middle, place), _covered(off, one.variance_mm2), one.moved))
-    return _at(times_us, found.__getitem__)
+    return _at(times_us, found.__getitem__, 1e6 * (first_s + 1 / case.hz))
 
 
 def _analog(scene: Scene, place: Place, first_s: float) -> Timeline:
@@ -272,7 +278,8 @@ def moved(case: Case, number: int) -> Timeline:
 
 
 class Mean(NamedTuple):
-    """Means over touches: errors in mm, and the place's over the barycenter's with half of its 95 % interval."""
+    """Means over touches: errors in mm, and the place's over the barycenter's and the share covered, with halves of
+    their 95 % intervals."""
 
     touches: int
     place: float
@@ -280,6 +287,7 @@ class Mean(NamedTuple):
     ratio: float
     half: float
     covered: float
+    covered_half: float
     moved: float
 
 
@@ -287,8 +295,9 @@ def mean(found: Iterable[Outcome | None]) -> Mean:
     place, barycenter, covered, flagged = np.array([one for one in found if one is not None]).T
     ratio = place.mean() / barycenter.mean()
     half = Z95 * (place - ratio * barycenter).std(ddof=1) / math.sqrt(len(place)) / barycenter.mean()
-    means = (float(one) for one in (place.mean(), barycenter.mean(), ratio, half, covered.mean(), flagged.mean()))
-    return Mean(len(place), *means)
+    covered_half = Z95 * covered.std(ddof=1) / math.sqrt(len(place))
+    means = (place.mean(), barycenter.mean(), ratio, half, covered.mean(), covered_half, flagged.mean())
+    return Mean(len(place), *(float(one) for one in means))
 
 
 def _piece(case: Case, first: int) -> list[Timeline]:
