@@ -27,6 +27,9 @@ from contactfpga.tracking.growth import Growth
 
 MOST_ROWS, SPREADS = 100, 6
 
+CHI2_95 = -2 * math.log(0.05)
+"""Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
+
 
 class PlacesError(ContactFPGAError, ValueError):
     """A table of places that cannot be used."""

@@ -19,7 +19,7 @@ from contactfpga.design import kits
 from contactfpga.design.cover import Body, Cover, load_cover
 from contactfpga.design.cover.layers import Layer
 from contactfpga.design.cover.numerics import Floats
-from contactfpga.tracking.places import Places
+from contactfpga.tracking.places import CHI2_95, Places
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
@@ -179,7 +179,7 @@ def _middle(track: Track) -> Place:
 
 
 def _covered(off_mm: float, variance_mm2: float) -> bool:
-    return off_mm**2 <= places.CHI2_95 * variance_mm2
+    return off_mm**2 <= CHI2_95 * variance_mm2
 
 
 def averaged(found: list[Outcome]) -> Outcome | None:
