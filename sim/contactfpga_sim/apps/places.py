@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -40,16 +41,13 @@ ON_SHEET = 0.02
 FLATTEST = 0.95
 """Share of the states of flat bodies whose times say nothing."""
 
-ENDLESS_US = 10**9
-"""Rest of a settled touch."""
-
 LEAST_MM2 = 1e-6
 """Added to squared errors, so that each has a logarithm."""
 
+NO_SPREADS = (Spread(0.0, 0.0),) * SPREADS
+
 ROUNDS = 60
 """Weighted least squares that lead to a line of quantiles."""
-
-NO_SPREADS = (Spread(0.0, 0.0),) * SPREADS
 
 Place = tuple[float, float]
 
@@ -86,7 +84,7 @@ def crossings(times: Floats, forces: Floats, thresholds: Floats) -> Floats:
 
 def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
     """The record of a single contact after each scan, one every ``period_us``, in which some of (..., rows, columns)
-    cells close, and once more when it is settled. Cells with levels close once at each."""
+    cells close. Cells with levels close once at each."""
     scans = np.ceil(closing_s * 1e6 / period_us - 1e-9)
     growth = Growth()
     for scan in np.unique(scans[np.isfinite(scans)]).tolist():
@@ -94,20 +92,21 @@ def grown(closing_s: Floats, period_us: float) -> Iterator[Growth]:
         closed = Moments(len(rows), int(columns.sum()), int(rows.sum()))
         growth.closings.append(Closing(round(scan * period_us), closed))
         yield growth
-    if growth.closings:
-        growth.rest_us = ENDLESS_US
-        yield growth
 
 
-class Touch(NamedTuple):
-    """A simulated touch by a single contact."""
+class Draw(NamedTuple):
+    """A state of a simulated touch by a single contact."""
 
-    closing_s: Floats
-    """Closing times, see :func:`closings`."""
-    place: Place
-    """The place of the contact's part on the sheet."""
+    cells: int
+    pace_us: float
+    """Mean time between closings."""
+    moves: Floats
+    """(2, 2) what the factors of a row multiply, in mm along x and y."""
+    off: Floats
+    """(2,) the true place, from the barycenter in mm, of the contact's part on the sheet."""
     whole: bool
-    """Whether the contact's own place is the same."""
+    """Whether all of the contact is on the sheet."""
+    settled: bool = False
 
 
 def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tuple[float, ...] = (1.0,)) -> Places:
@@ -116,42 +115,35 @@ def fit(skin: Skin, cover: Cover, count: int = 1000, seed: int = 0, levels: tupl
     Raises CoverError for the model ``patch``. ``levels``: closing forces of each cell over the switch's.
     """
     skin = dataclasses.replace(skin, closed=False)
-    seen = {family: touched(family, skin, cover, count, seed, levels) for family in (*FITTED, FLAT)}
-    grew = [one for family in FITTED for touch in seen[family] if touch.whole for one in draws(touch, skin)]
-    paces = [pace_us for touch in seen[FLAT] if touch.whole for cells, pace_us, _, _ in draws(touch, skin) if cells > 1]
-    least_us = float(np.quantile(paces or [0.0], FLATTEST))
-    rows = [row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grew))]
-    # The variances of this table number its spreads.
-    numbers = tuple(Spread(float(number), 0.0) for number in range(SPREADS))
-    table = Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, tuple(rows), numbers)
-    return dataclasses.replace(table, spreads=_spreads([_states(table, found, skin) for found in seen.values()]))
+    families = {family: list(draws(family, skin, cover, count, seed, levels)) for family in (*FITTED, FLAT)}
+    grew, flat = (
+        [one for each in kind for one in families[each] if one.whole and not one.settled] for kind in (FITTED, [FLAT])
+    )
+    least_us = float(np.quantile([one.pace_us for one in flat if one.cells > 1] or [0.0], FLATTEST))
+    rows = tuple(row for first, end in zip(CELLS, (*CELLS[1:], 10**9)) if (row := _row(first, end, least_us, grew)))
+    table = Places(skin.pitch_x_mm, skin.pitch_y_mm, least_us, rows, NO_SPREADS)
+    return dataclasses.replace(table, spreads=_spreads(families.values(), table))
 
 
-def touched(
+def draws(
     family: str, skin: Skin, cover: Cover, count: int, seed: int, levels: tuple[float, ...] = (1.0,)
-) -> list[Touch]:
-    found = []
-    for scene in touches(family, count, seed, skin, cover):
-        (place,), (on_sheet, *_) = (whereabouts(scene, part)(math.inf) for part in (None, skin))
-        whole = math.dist(place, on_sheet) <= ON_SHEET * skin.pitch_x_mm
-        found.append(Touch(closings(scene, skin, cover, levels), on_sheet, whole))
-    return found
+) -> Iterator[Draw]:
+    """The states of touches of a family by a single contact as its cells close, and each last one once more, settled.
 
-
-Draw = tuple[int, float, list[Floats], Floats]
-"""A state of a simulated touch: number of cells; mean time between closings in us; what the factors of a row multiply;
-and the true place, both from the barycenter in mm."""
-
-
-def draws(touch: Touch, skin: Skin) -> Iterator[Draw]:
+    Raises CoverError for the model ``patch``.
+    """
     pitches = skin.pitch_x_mm, skin.pitch_y_mm
     # A table with a single factor moves a place by what that factor multiplies.
     units = [Places(*pitches, 0.0, (Row(1, *factors, 1e9),), NO_SPREADS) for factors in ((1.0, 0.0), (0.0, 1.0))]
-    for growth in grown(touch.closing_s, frame_us(skin)):
-        count, at = middle(growth, skin.sheet)
-        moves = [np.subtract(unit.of(growth, *at, count)[:2], at) for unit in units]
-        if not growth.settled:
-            yield count, growth.span_us / max(1, count - 1), moves, np.subtract(touch.place, at)
+    for scene in touches(family, count, seed, skin, cover):
+        (place,), (on_sheet, *_) = (whereabouts(scene, part)(math.inf) for part in (None, skin))
+        whole, states = math.dist(place, on_sheet) <= ON_SHEET * pitches[0], []
+        for growth in grown(closings(scene, skin, cover, levels), frame_us(skin)):
+            cells, at = middle(growth, skin.sheet)
+            moves = np.array([np.subtract(unit.of(growth, *at, cells)[:2], at) for unit in units])
+            pace_us = growth.span_us / max(1, cells - 1)
+            states.append(Draw(cells, pace_us, moves, np.subtract(on_sheet, at), whole))
+        yield from (*states, *(one._replace(settled=True) for one in states[-1:]))
 
 
 def middle(growth: Growth, sheet: Sheet) -> tuple[int, Place]:
@@ -166,55 +158,49 @@ def frame_us(skin: Skin) -> float:
 
 
 def _row(first: int, end: int, least_us: float, grew: list[Draw]) -> Row | None:
-    here = [one for one in grew if first <= one[0] < end]
+    here = [one for one in grew if first <= one.cells < end]
     if len(here) < FEWEST:
         return None
-    _, paces_us, moves, off = (np.array(column) for column in zip(*here))
-    told = paces_us > least_us
-    if first <= TOO_FEW or not told.any():
+    told = [one for one in here if one.pace_us > least_us]
+    if first <= TOO_FEW or not told:
         return Row(first, 0.0, 0.0, 0.0)
-    flat = moves[told].transpose(0, 2, 1).reshape(-1, 2)
-    linear, square = factors = np.linalg.lstsq(flat, off[told].ravel(), rcond=1e-6)[0]
-    reach_mm = float(np.quantile(np.hypot(*(factors @ moves[told]).T), FARTHEST))
+    moves, off = np.array([one.moves for one in told]), np.array([one.off for one in told])
+    flat = moves.transpose(0, 2, 1).reshape(-1, 2)
+    linear, square = factors = np.linalg.lstsq(flat, off.ravel(), rcond=1e-6)[0]
+    reach_mm = float(np.quantile(np.hypot(*(factors @ moves).T), FARTHEST))
     return Row(first, float(linear), float(square), reach_mm)
 
 
-def _states(table: Places, found: list[Touch], skin: Skin) -> Floats:
-    """(n, 4) number of the spread, logarithms of the number of cells and of the squared error over mm2, and weight of
-    all states of a family's touches: those that settled weigh as much as all others."""
-    states = []
-    for touch in found:
-        for growth in grown(touch.closing_s, frame_us(skin)):
-            count, at = middle(growth, skin.sheet)
-            x_mm, y_mm, number, _ = table.of(growth, *at, count)
-            off_mm2 = math.dist((x_mm, y_mm), touch.place) ** 2
-            states.append((number, math.log(count), math.log(off_mm2 + LEAST_MM2), growth.settled))
-    number, cells, off, settled = np.array(states).reshape(-1, 4).T
-    settled = settled > 0
-    weights = np.where(settled, 1 / max(1, settled.sum()), 1 / max(1, (~settled).sum()))
-    return np.column_stack([number, cells, off, weights])
-
-
-def _spreads(families: list[Floats]) -> tuple[Spread, ...]:
-    number, cells, off, weight = np.concatenate(families).T
+def _spreads(families: Iterable[list[Draw]], table: Places) -> tuple[Spread, ...]:
+    """The spreads of a table's places. Each family weighs as much as another, while its cells close and settled."""
+    weights = []
+    for family in families:
+        settled = sum(one.settled for one in family)
+        weights += [1 / (settled if one.settled else len(family) - settled) for one in family]
+    cells, paces_us, moves, off, _, settled = (np.array(column) for column in zip(*itertools.chain(*families)))
+    least, linear, square, reach_mm = np.array([dataclasses.astuple(row) for row in table.rows]).T
+    row = np.searchsorted(least, cells, side="right") - 1
+    moved = linear[row, None] * moves[:, 0] + square[row, None] * moves[:, 1]
+    told = (paces_us > table.least_us) & (np.hypot(*moved.T) <= reach_mm[row])
+    errors = np.log(((off - told[:, None] * moved) ** 2).sum(axis=1) + LEAST_MM2)
+    kinds = np.where(cells <= TOO_FEW, 0, 1 + told) + SPREADS // 2 * settled
     found: list[Spread] = []
     for kind in range(SPREADS):
-        here = number == kind
-        if here.sum() < (FEWEST_SETTLED if kind >= SPREADS // 2 else TOO_FEW):
-            found.append(found[kind - SPREADS // 2] if kind >= SPREADS // 2 else found[-1])
-            continue
-        level, power = quantile_line(cells[here], off[here], weight[here])
-        found.append(Spread(math.exp(level) / CHI2_95, power))
+        here = kinds == kind
+        if kind >= SPREADS // 2 and here.sum() < FEWEST_SETTLED:
+            found.append(found[kind - SPREADS // 2])
+        else:
+            level, power = quantile_line(np.log(cells[here]), errors[here], np.array(weights)[here])
+            found.append(Spread(math.exp(level) / CHI2_95, power))
     return tuple(found)
 
 
 def quantile_line(x: Floats, y: Floats, weights: Floats, share: float = 0.95) -> tuple[float, float]:
-    """Level and slope of the line that lies above a share of weighted points (x, y), at whatever x: the one of the
-    least sum of distances, which count ``share`` for points above it and 1 - ``share`` below."""
-    terms = np.column_stack([np.ones_like(x), x])
-    line = np.array([np.quantile(y, share), 0.0])
+    """Level and slope of the line that has a share of the weighted points (x, y) below it, at whatever x: the one of
+    the least sum of distances, which count ``share`` for points above it and 1 - ``share`` for those below."""
+    line, terms = np.zeros(2), np.column_stack([np.ones_like(x), x])
     for _ in range(ROUNDS):
         off = y - terms @ line
-        each = weights * np.where(off > 0, share, 1 - share) / np.maximum(np.abs(off), 1e-3)
-        line = np.linalg.lstsq(terms * np.sqrt(each)[:, None], y * np.sqrt(each), rcond=1e-9)[0]
+        root = np.sqrt(weights * np.where(off > 0, share, 1 - share) / np.maximum(np.abs(off), 1e-3))
+        line = np.linalg.lstsq(terms * root[:, None], y * root, rcond=1e-9)[0]
     return float(line[0]), float(line[1])

@@ -126,7 +126,7 @@ def cover(spread: float | None = None) -> Cover:
 
 @functools.cache
 def table(levels: tuple[float, ...] = (1.0,)) -> Places:
-    return places.fit(SKIN, cover(), levels=levels)
+    return places.fit(SKIN, cover(), 2000 // (1 + len(levels)), levels=levels)
 
 
 def drawn(case: Case, number: int) -> tuple[Scene, np.random.Generator]:
