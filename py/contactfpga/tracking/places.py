@@ -27,9 +27,6 @@ from contactfpga.tracking.growth import Growth
 
 MOST_ROWS, SPREADS = 100, 6
 
-CHI2_95 = -2 * math.log(0.05)
-"""Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
-
 
 class PlacesError(ContactFPGAError, ValueError):
     """A table of places that cannot be used."""
@@ -98,9 +95,8 @@ class Places:
 
     def __post_init__(self) -> None:
         numbers = [(name, getattr(self, name)) for name in ("pitch_x_mm", "pitch_y_mm", "least_us")]
-        numbers += [
-            item for row in (*self.rows[: MOST_ROWS + 1], *self.spreads[: SPREADS + 1]) for item in vars(row).items()
-        ]
+        parts = self.rows[: MOST_ROWS + 1] + self.spreads[: SPREADS + 1]
+        numbers += [item for part in parts for item in vars(part).items()]
         for name, value in numbers:
             low, high = LIMITS.get(name, (0.0, 1e9))
             if not is_finite(value) or not low <= value <= high:
@@ -159,9 +155,8 @@ class Places:
             return barycenter._replace(moved=True)
         x = sum(one.closed.sum_x for one in closings) / recorded
         y = sum(one.closed.sum_y for one in closings) / recorded
-        return PlaceEstimate(
-            self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, self._variance_mm2(growth, recorded, True)
-        )
+        variance_mm2 = self._variance_mm2(growth, recorded, True)
+        return PlaceEstimate(self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, variance_mm2)
 
     def _variance_mm2(self, growth: Growth, cells: int, told: bool) -> float:
         apart_mm2 = self.pitch_x_mm**2 * growth.apart[0] + self.pitch_y_mm**2 * growth.apart[1]

@@ -166,8 +166,8 @@ class Tracker:
             if self._around_mm is not None:
                 x_mm %= self._around_mm
             covariance = ((variance, 0.0), (0.0, variance))
-            told = {"place_mm": (x_mm, y_mm), "place_cov_mm2": covariance}
-            found.append(dataclasses.replace(track, **told, moved=growth.moved, missed=growth.missed))
+            track = dataclasses.replace(track, moved=growth.moved, missed=growth.missed)
+            found.append(dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance))
         return found
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:

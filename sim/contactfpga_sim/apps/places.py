@@ -15,7 +15,7 @@ from contactfpga.design.cover.numerics import Floats
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.growth import Closing, Growth, Moments
-from contactfpga.tracking.places import CHI2_95, SPREADS, TOO_FEW, Places, Row, Spread
+from contactfpga.tracking.places import SPREADS, TOO_FEW, Places, Row, Spread
 from contactfpga_sim.model.scenes.contacts import M
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
@@ -31,6 +31,9 @@ CELLS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 14, 18, 23, 30, 40, 55, 75, 100)
 
 FEWEST, FEWEST_SETTLED = 100, 40
 """States from which a row is fitted, and a spread of settled ones. With fewer these have that of the others."""
+
+CHI2_95 = -2 * math.log(0.05)
+"""Squared distance, over the variance along each axis, that 95 % of places in a plane keep."""
 
 FARTHEST = 0.99
 """Share of the states whose place lies within :attr:`Row.reach_mm` of the barycenter."""

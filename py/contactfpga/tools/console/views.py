@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -18,7 +17,6 @@ from contactfpga.robot.haptics import Contact, Contacts
 from contactfpga.tools.console import drawn_sheet
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tools.console.live import Room
-from contactfpga.tracking.places import CHI2_95
 from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
 
@@ -102,23 +100,22 @@ def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
 def table(
     zones: Zones, lines: int | None = None, tracks: Tracks | None = None, contacts: Contacts | None = None
 ) -> Table:
-    """The zones, as many as there are lines for."""
+    """The zones, as many as there are lines for; contacts with places at these."""
     most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
     left_out = len(zones) - most
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
     caption = f"and {left_out} more" if left_out > 0 else None
     made = Table(title=title, caption=caption)
     ids = {} if tracks is None else {id(track.zone): _names(track) for track in tracks.active}
+    places = {} if tracks is None else {id(one.zone): one.place_mm for one in tracks.active if one.place_mm}
     pushes = _pushes(zones, contacts)
-    placed = {} if tracks is None else {id(track.zone): _place(track) for track in tracks.active if track.place_mm}
     before, after = [] if tracks is None else ["id"], [] if contacts is None else ["N", "from", "to"]
-    for heading in (*before, "cells", "mm²", "x mm", "y mm", *(["place mm"] if placed else []), *after):
+    for heading in (*before, "cells", "mm²", "x mm", "y mm", *after):
         made.add_column(heading, justify="right", no_wrap=True)
     for zone, push in list(zip(zones, pushes))[:most]:
-        x, y = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
+        x, y = ("-" if length is None else f"{length:.2f}" for length in places.get(id(zone), (zone.x_mm, zone.y_mm)))
         name = [] if tracks is None else [ids.get(id(zone), "-")]
-        place = [placed.get(id(zone), "-")] if placed else []
-        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", zone.winding or x, y, *place, *push)
+        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", zone.winding or x, y, *push)
     return made
 
 
@@ -143,14 +140,6 @@ def _interval(contact: Contact) -> tuple[float | None, float | None]:
 
 def _names(track: Track) -> str:
     return "+".join(map(str, (track.id, *track.merged)))
-
-
-def _place(track: Track) -> str:
-    """The place, and the radius that holds 95 % of the errors."""
-    assert track.place_mm is not None
-    assert track.place_cov_mm2 is not None
-    radius_mm = math.sqrt(CHI2_95 * track.place_cov_mm2[0][0])
-    return "{:.2f}, {:.2f} ± {:.1f}".format(*track.place_mm, radius_mm)
 
 
 def _mask(board: Board) -> drawn_sheet.Mask:

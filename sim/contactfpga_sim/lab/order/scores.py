@@ -19,7 +19,7 @@ from contactfpga.design import kits
 from contactfpga.design.cover import Body, Cover, load_cover
 from contactfpga.design.cover.layers import Layer
 from contactfpga.design.cover.numerics import Floats
-from contactfpga.tracking.places import CHI2_95, Places
+from contactfpga.tracking.places import Places
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.zone import Zones
@@ -102,8 +102,7 @@ GROWING = (
     Case("a finger, a fifth of the frames lost", lost=0.2),
 )
 TIMED = (
-    *(Case(f"{hz:,.0f} frames per second", body=FIRM, hz=hz) for hz in RATES_HZ[:-1]),
-    Case(f"{RATES_HZ[-1]:,.0f} frames per second (reversal)", body=FIRM, hz=RATES_HZ[-1]),
+    *(Case(f"{hz:,.0f} frames per second{' (reversal)' * (hz > HZ)}", body=FIRM, hz=hz) for hz in RATES_HZ),
     Case("five levels per cell", body=FIRM, sensor="levels"),
     Case("five levels, from their own first crossing", body=FIRM, sensor="levels", early=True),
     Case("8-bit analog array", body=FIRM, sensor="analog"),
@@ -179,7 +178,7 @@ def _middle(track: Track) -> Place:
 
 
 def _covered(off_mm: float, variance_mm2: float) -> bool:
-    return off_mm**2 <= CHI2_95 * variance_mm2
+    return off_mm**2 <= places.CHI2_95 * variance_mm2
 
 
 def averaged(found: list[Outcome]) -> Outcome | None:
@@ -258,9 +257,8 @@ def moved(case: Case, number: int) -> Timeline:
     (contact,) = scene.contacts
     angle = rng.uniform(0, 2 * math.pi)
     middle = (contacts.at(value, 0.0) for value in (contact.x_mm, contact.y_mm))
-    ends = [
-        (at - FAR_MM / 2 * turn, at + FAR_MM / 2 * turn) for at, turn in zip(middle, (math.cos(angle), math.sin(angle)))
-    ]
+    halves = FAR_MM / 2 * math.cos(angle), FAR_MM / 2 * math.sin(angle)
+    ends = [(at - half, at + half) for at, half in zip(middle, halves)]
     begins = dataclasses.replace(contact, x_mm=ends[0][0], y_mm=ends[1][0])
     first_s = float(places.closings(dataclasses.replace(scene, contacts=(begins,)), SKIN, cover()).min())
     start_s = first_s if case.rises else scene.settled_s + WAIT_S

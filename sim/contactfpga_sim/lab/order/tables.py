@@ -25,15 +25,8 @@ def compute() -> Found:
 
 def places_table(found: Found) -> writer.Table:
     """Worst first. The page shows the worst condition alone."""
-    head = (
-        "touches",
-        "number",
-        "barycenter, mm",
-        "place, mm",
-        "place over barycenter, %",
-        "in the ellipse, %",
-        "in it after 10 ms, %",
-    )
+    errors = "barycenter, mm", "place, mm", "place over barycenter, %"
+    head = ("touches", "number", *errors, "in the ellipse, %", "in it after 10 ms, %")
     worst = sorted(GROWING, key=lambda case: -found[case][SETTLED].ratio)
     rows = [(case.title, *_cells(found[case][SETTLED]), _covered(found[case][RISING])) for case in worst]
     return writer.Table(head, rows, lambda row: "," not in row[0] or WORST in row[0])
