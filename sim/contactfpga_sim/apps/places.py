@@ -20,7 +20,7 @@ from contactfpga_sim.model.scenes.contacts import M
 from contactfpga_sim.model.scenes.families import touches
 from contactfpga_sim.model.scenes.scene import Scene
 
-STEPS = 40
+STEPS = 20
 """Moments of a rise at which forces are computed. Between them each is linear in time."""
 
 FITTED, FLAT = ("finger", "bumper"), "edge"
