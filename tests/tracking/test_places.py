@@ -232,9 +232,12 @@ def test_finite_elements_are_placed_better_than_by_the_barycenter(fitted, tilts)
 
 def test_touches_in_place_are_not_flagged_and_slides_and_fast_rolls_are(fitted, monkeypatch):
     monkeypatch.setattr(scores, "table", lambda levels=(1.0,): fitted)
-    still = scores.mean(scores.grown(scores.GROWING[0], number)[-1] for number in range(40))
+    still, bar = (scores.mean(scores.grown(case, n)[-1] for n in range(40)) for case in scores.GROWING[0:7:6])
     slid, rolled = (scores.mean(scores.moved(case, number)[-1] for number in range(6)) for case in scores.MOVING[1::4])
     assert still.ratio + still.half < 0.7
+    assert min(still.covered, bar.covered) > 0.87
+    radii_mm = [np.sqrt(6 * spread.one_mm2 * 8**spread.power) for spread in fitted.spreads]
+    assert 0.7 < radii_mm[5] < radii_mm[2] < 2.5 < radii_mm[4] < radii_mm[1]  # of eight cells
     assert (still.moved, slid.moved, rolled.moved) == (0.0, 1.0, 1.0)
 
 
