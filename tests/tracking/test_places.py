@@ -237,7 +237,7 @@ def test_touches_in_place_are_not_flagged_and_slides_and_fast_rolls_are(fitted, 
     assert still.ratio + still.half < 0.7
     assert min(still.covered, bar.covered) > 0.87
     radii_mm = [np.sqrt(6 * spread.one_mm2 * 8**spread.power) for spread in fitted.spreads]
-    assert 0.7 < radii_mm[5] < radii_mm[2] < 2.5 < radii_mm[4] < radii_mm[1]  # of eight cells
+    assert 0.7 < radii_mm[5] < 1.7 < radii_mm[2] < 2.5 < radii_mm[4] < radii_mm[1]  # of eight cells
     assert (still.moved, slid.moved, rolled.moved) == (0.0, 1.0, 1.0)
 
 

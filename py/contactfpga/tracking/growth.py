@@ -122,7 +122,6 @@ class Growth:
         self._opened_us = min(open_since, default=0)
         self._opened = self._opened.plus(other._opened.shifted(shift))
         self.moved |= other.moved
-        self.missed = max(self.missed, other.missed)
 
     def _has(self, change: Moments) -> bool:
         """Whether a change is a single cell that is known to have closed."""
