@@ -161,7 +161,7 @@ class Places:
     def _variance_mm2(self, growth: Growth, cells: int, told: bool) -> float:
         apart_mm2 = self.pitch_x_mm**2 * growth.apart[0] + self.pitch_y_mm**2 * growth.apart[1]
         spread = self.spreads[3 * growth.settled + (0 if cells <= TOO_FEW else 1 + told)]
-        return spread.one_mm2 * cells**spread.power + apart_mm2 / 2
+        return spread.one_mm2 * math.pow(cells, spread.power) + apart_mm2 / 2
 
     def _row(self, cells: int) -> Row:
         return self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]
