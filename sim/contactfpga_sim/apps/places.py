@@ -178,8 +178,8 @@ def _spreads(families: Iterable[list[Draw]], table: Places) -> tuple[Spread, ...
     """The spreads of a table's places. Each family weighs as much as another, while its cells close and settled."""
     weights = []
     for family in families:
-        settled = sum(one.settled for one in family)
-        weights += [1 / (settled if one.settled else len(family) - settled) for one in family]
+        ends = sum(one.settled for one in family)
+        weights += [1 / (ends if one.settled else len(family) - ends) for one in family]
     cells, paces_us, moves, off, _, settled = (np.array(column) for column in zip(*itertools.chain(*families)))
     least, linear, square, reach_mm = np.array([dataclasses.astuple(row) for row in table.rows]).T
     row = np.searchsorted(least, cells, side="right") - 1
