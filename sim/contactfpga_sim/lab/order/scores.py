@@ -84,8 +84,8 @@ class Case:
 FAR_MM, WAIT_S = 20.0, 0.02
 """Way of a moving contact, and its rest before it slides."""
 
-REST_S = 0.25
-"""Time after the last change until a touch counts as settled."""
+RESTS_S = 0.001, 0.003, 0.01, 0.03, 0.1, 0.25
+"""Times after the last change of frames of a touch that settles."""
 
 STEP_MM, STEP_S = 0.1, 1e-3
 """Most from frame to frame of a moving contact."""
@@ -140,11 +140,11 @@ def drawn(case: Case, number: int) -> tuple[Scene, np.random.Generator]:
 
 
 def frames(changes_s: Floats, hz: float) -> Iterator[Zones]:
-    """The frames in which cells change, and one at rest. (n, rows, columns) ``changes_s`` rise: a cell closes at the
+    """The frames in which cells change, and some at rest. (n, rows, columns) ``changes_s`` rise: a cell closes at the
     first time, opens at the second, and so on."""
     scans = np.ceil(changes_s * hz - 1e-9)
     changing = np.unique(scans[np.isfinite(scans)])
-    for scan in (*changing, *(changing[-1:] + REST_S * hz)):
+    for scan in (*changing, *(changing[-1:, None] + np.multiply(RESTS_S, hz)).flat):
         yield zones_of((scans <= scan).sum(axis=0) % 2 == 1, round(scan / hz * 1e6), SKIN)[0]
 
 
