@@ -1,5 +1,5 @@
-"""Places by the order of closings: kills weights that go to the wrong cells, a table that is read wrong, and one that
-is no better than the barycenter under bodies that the contact model did not make."""
+"""Places by the order of closings: kills weights that go to the wrong cells, a table that is read wrong, one that is no
+better than the barycenter under bodies that the contact model did not make, and the covariance of another state."""
 
 import dataclasses
 
