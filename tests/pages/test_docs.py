@@ -114,8 +114,17 @@ UNTIL_CTRL_C = ("zones", "view", "ros", "publish")
 EARLIER = {"docs/view.md": ["record touches.mcap sim:// --seconds 0.1"]}
 """What the reader of a page has done before."""
 PRINTED = [page for page, found in RUN.items() if found]
-LONG = {"docs/recordings.md", "docs/ip.md", "docs/view.md", "docs/cell.md", "docs/soft.md"}
-"""Their commands take longer than those of all others: they write Verilog, export a recording, and load the view."""
+LONG = {
+    "docs/recordings.md",
+    "docs/ip.md",
+    "docs/view.md",
+    "docs/cell.md",
+    "docs/soft.md",
+    "docs/levels.md",
+    "docs/benchmark.md",
+}
+"""Their commands take longer than those of all others: they write Verilog, export a recording, load the view, and draw
+the benchmark."""
 
 
 def test_what_is_left_out_is_on_a_page():
