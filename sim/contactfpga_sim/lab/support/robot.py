@@ -1,0 +1,215 @@
+"""JVRC-1 leans its forearm, thigh and shin on edges, corners, plates and bars.
+
+MuJoCo moves the robot, whose joints are springs, against the bed of its foam. The compiled gateware scans the switches
+that the foam closes, its bytes go to the driver by the USB chip's model, and the supports are those of a snapshot.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy import ndimage
+
+from contactfpga.mujoco import Sheets, wear
+from contactfpga.robot.body import Body, Support
+from contactfpga.robot.body.kinematics import Pose, rotation_about
+from contactfpga.robot.body.plan import Plan
+from contactfpga.surfaces.shapes import Floats
+from contactfpga.tools.view.fingers import Finger
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.apps import pool
+from contactfpga_sim.lab.benchmark.pressed import Patches
+from contactfpga_sim.lab.support import compute
+from contactfpga_sim.lab.support.bed import COVER, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
+
+KINDS = ("edge", "corner", "plate", "bar")
+POSES, PIECE = 200, 10
+"""Poses, in each of which all links lean, and poses per piece of work."""
+PER, SETTLING = 3, 12
+"""Places of the bed per pitch, and steps of 1 ms in which robot and foam move."""
+STIFF_NM, DAMPED_NMS = 3e3, 100.0
+"""Springs and dampers of the joints, per rad."""
+FORCE_N, APART_MM = (60.0, 300.0), 60.0
+MOST_STEPS = 60
+
+
+class Lean(NamedTuple):
+    """One link that leans."""
+
+    link: str
+    kind: str
+    """One of :data:`KINDS`, or ``several``."""
+    outcome: compute.Outcome
+    alone: list[bool]
+    """For each component of the wrench of a zone that is the only one: whether it is within its interval."""
+    among: list[bool]
+    """The same of several zones, each with the force on the cells nearest to it."""
+
+
+def thing(kind: str, rng: np.random.Generator, point_m: Floats, normal: Floats) -> Thing:
+    """A thing that touches a place on the sheet from outside, turned at random."""
+    aside = np.cross(normal, [0.0, 0.0, 1.0])
+    frame = np.stack([np.cross(aside, normal), aside, normal], axis=1) @ rotation_about(
+        (0, 0, 1), rng.uniform(0, 2 * math.pi)
+    )
+    if kind == "bar":
+        radius = float(rng.uniform(8e-3, 20e-3))
+        return Thing(radius, frame, point_m + radius * normal)
+    if kind == "edge":
+        frame = frame @ rotation_about((1, 0, 0), rng.uniform(0.35, 1.2))
+        half, toward = np.array([0.2, 0.05, 0.05]), (0, -1, -1)
+    else:
+        tilt = rotation_about((1, 0, 0), rng.uniform(-0.05, 0.05)) @ rotation_about((0, 1, 0), rng.uniform(-0.05, 0.05))
+        frame = frame @ tilt
+        half = np.append(rng.uniform(0.02, 0.04, 2) if kind == "plate" else (0.1, 0.1), 0.02)
+        toward = (0, 0, -1) if kind == "plate" else (-1, -1, -1)
+    return Thing(tuple(half.tolist()), frame, point_m - frame @ (half * toward))
+
+
+def pressed(one: Thing, bed: Bed, normal: Floats, force_n: float) -> Thing:
+    """The thing, moved along the normal until it presses with this force on a link at the origin."""
+    low, high = -0.02, 0.02
+    for _ in range(24):
+        middle = (low + high) / 2
+        one = dataclasses.replace(one, point_m=one.point_m - middle * normal)
+        total = bed.forces_n(bed.depths_m([one], np.zeros(3), np.eye(3))).sum()
+        one = dataclasses.replace(one, point_m=one.point_m + middle * normal)
+        low, high = (middle, high) if total < force_n else (low, middle)
+    return dataclasses.replace(one, point_m=one.point_m - low * normal)
+
+
+def drawn(plan: Plan, bed: Bed, rng: np.random.Generator) -> tuple[str, list[Thing]]:
+    """Things in the link's frame, one or several, and their kind."""
+    count = int(rng.choice([1, 1, 2, 3]))
+    kinds, places = rng.choice(KINDS, count), np.zeros((0, 2))
+    while len(places) < count:
+        place = rng.uniform(4 * PITCH_MM, (plan.skin.columns - 5) * PITCH_MM, 2)
+        if (np.hypot(*(places - place).T) > APART_MM).all():
+            places = np.append(places, place[None], axis=0)
+    found = []
+    for kind, (x, y) in zip(kinds, places.tolist()):
+        point, normal = (np.array(each) for each in plan.place(x, y))
+        found.append(pressed(thing(kind, rng, point, normal), bed, normal, rng.uniform(*FORCE_N) / count))
+    return str(kinds[0]) if count == 1 else "several", found
+
+
+class Stand:
+    """JVRC-1 in MuJoCo, its pelvis held, with sheets on :data:`LINKS`."""
+
+    def __init__(self, folder: Path):
+        path = write_robot(folder, list(LINKS), units=True)
+        self.plans = Body.load(path).links
+        spec = humanoid(Body.load(path).urdf)
+        spec.option.timestep = 1e-3
+        wear(spec, path)
+        self.model = spec.compile()
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # the bed presses in their place
+        self.data = mujoco.MjData(self.model)
+        self.model.jnt_stiffness[:], self.model.dof_damping[:] = STIFF_NM, DAMPED_NMS
+        self.sheets = Sheets(self.model, self.data, path, radius_m=1e-4)
+        self.beds = {name: Bed(plan, PER) for name, plan in self.plans.items()}
+
+    def lean(self, number: int) -> list[Lean]:
+        """All links lean on things drawn with this number."""
+        rng, data = np.random.default_rng([56, number]), self.data
+        data.qpos[:] = self.model.qpos_spring[:] = rng.uniform(-0.3, 0.3, self.model.nq)
+        data.qvel[:] = 0
+        mujoco.mj_kinematics(self.model, data)
+        kinds, things = {}, {}
+        for name, plan in self.plans.items():
+            kinds[name], found = drawn(plan, self.beds[name], rng)
+            pose = self._pose(plan)
+            things[name] = [Thing(one.half_m, pose.turn(one.rotation.T).T, pose.apply(one.point_m)) for one in found]
+        for _ in range(SETTLING):
+            there = {name: self._press(name, things[name]) for name in things}
+            self.sheets.step()
+        began_us = 1e6 * self.sheets.clock()
+        for _ in range(MOST_STEPS):
+            self.sheets.step()
+            snapshot = self.sheets.snapshot()
+            states = {name: snapshot.links[name].zones for name in things}
+            if all(one and one.units and one.units.time_us > began_us + 1e3 for one in states.values()):
+                break
+        else:
+            raise AssertionError("a board sends no readings")
+        found = []
+        for name, zones in states.items():
+            supports, cells = snapshot.supports("link", [name]), zones.cells
+            flat = [flattened(one, self.plans[name]) for one in supports]
+            rectangles = compute.rectangles(cells, PITCH_MM, COVER)
+            judged = compute.outcome(compute.Drawn(there[name], cells, flat, rectangles), PITCH_MM)
+            found.append(Lean(name, kinds[name], judged, *self._wrenches(name, cells, supports, zones)))
+        return found
+
+    def _pose(self, plan: Plan) -> Pose:
+        return Pose(self.data.body(plan.frame).xmat.reshape(3, 3).copy(), self.data.body(plan.frame).xpos.copy())
+
+    def _press(self, name: str, things: list[Thing]) -> Patches:
+        """Push the link by fingers, one for each cell, at the center of what the bed presses there."""
+        bed, pose = self.beds[name], self._pose(self.plans[name])
+        there = Patches(
+            bed.forces_n(bed.depths_m(things, pose.point_m, pose.rotation)).reshape(len(bed.y_mm), -1),
+            *(bed.x_mm, bed.y_mm, PER),
+        )
+        x, y = (
+            Patches(there.force_n * places, bed.x_mm, bed.y_mm, PER).cells_n for places in (bed.x_mm, bed.y_mm[:, None])
+        )
+        force = there.cells_n
+        at = force > 0
+        fingers = np.stack([x[at] / force[at], y[at] / force[at], np.zeros(at.sum()), force[at]], axis=1)
+        self.sheets[name].touch([Finger(*one) for one in fingers.tolist()])
+        return there
+
+    def _wrenches(
+        self, name: str, cells: np.ndarray, supports: list[Support], zones: Zones
+    ) -> tuple[list[bool], list[bool]]:
+        """The components of :attr:`Lean.alone` and :attr:`Lean.among`."""
+        labels = ndimage.label(cells)[0]
+        nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
+        shares: dict[int, Floats] = {}
+        for touch in self.sheets[name].touches:
+            row, column = (
+                min(max(round(place / PITCH_MM), 0), len(cells) - 1) for place in (touch.y_mm or 0.0, touch.x_mm or 0.0)
+            )
+            label = int(labels[nearest[0, row, column], nearest[1, row, column]])
+            six = np.concatenate([touch.force_n, np.cross(touch.point_m, touch.force_n)])
+            shares[label] = shares.get(label, np.zeros(6)) + six
+        hits = []
+        for one in supports:
+            true, between = shares[int(labels[zones.cells_of(one.zone)].max())], one.wrench_interval
+            assert between is not None
+            hits += [bool(low <= value <= high) for value, (low, high) in zip(true, between)]
+        return (hits, []) if len(supports) == 1 else ([], hits)
+
+
+def flattened(support: Support, plan: Plan) -> Support:
+    """The support with its polygon on the sheet laid flat."""
+    own = (support.corners_m - plan.pose.point_m) @ plan.pose.rotation
+    radius = 1e-3 * float(plan.skin.radius_mm or 0.0)
+    middle = 5e-4 * (plan.skin.columns - 1) * plan.skin.pitch_x_mm / radius
+    angle = (np.arctan2(own[:, 1], own[:, 0]) - middle + math.pi) % (2 * math.pi) - math.pi + middle
+    return dataclasses.replace(support, corners_m=np.stack([radius * angle, own[:, 2], 0 * angle], axis=1))
+
+
+@functools.cache
+def stand() -> Stand:
+    """One for each process."""
+    with tempfile.TemporaryDirectory() as folder:
+        return Stand(Path(folder))
+
+
+def leans(first: int) -> list[Lean]:
+    return [one for number in range(first, first + PIECE) for one in stand().lean(number)]
+
+
+def lean_all() -> list[Lean]:
+    """All leans of :data:`POSES`."""
+    with pool.executor() as workers:
+        return [one for piece in workers.map(leans, range(0, POSES, PIECE)) for one in piece]
