@@ -6,6 +6,7 @@ that the foam closes, its bytes go to the driver by the USB chip's model, and th
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import math
@@ -17,8 +18,9 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
+from contactfpga.errors import ReadTimeout
 from contactfpga.mujoco import Sheets, wear
-from contactfpga.robot.body import Body, Support
+from contactfpga.robot.body import Body, LinkState, Snapshot, Support
 from contactfpga.robot.body.kinematics import Pose, rotation_about
 from contactfpga.robot.body.plan import Plan
 from contactfpga.surfaces.shapes import Floats
@@ -37,7 +39,8 @@ PER, SETTLING = 3, 12
 STIFF_NM, DAMPED_NMS = 3e3, 100.0
 """Springs and dampers of the joints, per rad."""
 FORCE_N, APART_MM = (60.0, 300.0), 60.0
-MOST_STEPS = 60
+STALE_S, READ_S = 2e-3, 15e-3
+"""Time after a touch in which frames may be older, and time of reading."""
 
 
 class Lean(NamedTuple):
@@ -75,8 +78,8 @@ def thing(kind: str, rng: np.random.Generator, point_m: Floats, normal: Floats) 
 
 def pressed(one: Thing, bed: Bed, normal: Floats, force_n: float) -> Thing:
     """The thing, moved along the normal until it presses with this force on a link at the origin."""
-    low, high = -0.02, 0.02
-    for _ in range(24):
+    low, high = -0.005, 0.01
+    for _ in range(16):
         middle = (low + high) / 2
         one = dataclasses.replace(one, point_m=one.point_m - middle * normal)
         total = bed.forces_n(bed.depths_m([one], np.zeros(3), np.eye(3))).sum()
@@ -129,18 +132,16 @@ class Stand:
             things[name] = [Thing(one.half_m, pose.turn(one.rotation.T).T, pose.apply(one.point_m)) for one in found]
         for _ in range(SETTLING):
             there = {name: self._press(name, things[name]) for name in things}
-            self.sheets.step()
-        began_us = 1e6 * self.sheets.clock()
-        for _ in range(MOST_STEPS):
-            self.sheets.step()
-            snapshot = self.sheets.snapshot()
-            states = {name: snapshot.links[name].zones for name in things}
-            if all(one and one.units and one.units.time_us > began_us + 1e3 for one in states.values()):
-                break
-        else:
-            raise AssertionError("a board sends no readings")
+            mujoco.mj_step(self.model, data)
+        data.xfrc_applied[:] = 0
+        for name in things:
+            self.sheets[name].touch(_fingers(there[name]))
+        self.sheets.step()
+        frames = {name: self._read(name) for name in things}
+        states = {name: LinkState(zones, 0.0, "ok", frame_s=0.0) for name, zones in frames.items()}
+        snapshot = Snapshot(self.sheets.body, 0.0, states)
         found = []
-        for name, zones in states.items():
+        for name, zones in frames.items():
             supports, cells = snapshot.supports("link", [name]), zones.cells
             flat = [flattened(one, self.plans[name]) for one in supports]
             rectangles = compute.rectangles(cells, PITCH_MM, COVER)
@@ -152,20 +153,30 @@ class Stand:
         return Pose(self.data.body(plan.frame).xmat.reshape(3, 3).copy(), self.data.body(plan.frame).xpos.copy())
 
     def _press(self, name: str, things: list[Thing]) -> Patches:
-        """Push the link by fingers, one for each cell, at the center of what the bed presses there."""
-        bed, pose = self.beds[name], self._pose(self.plans[name])
-        there = Patches(
-            bed.forces_n(bed.depths_m(things, pose.point_m, pose.rotation)).reshape(len(bed.y_mm), -1),
-            *(bed.x_mm, bed.y_mm, PER),
-        )
-        x, y = (
-            Patches(there.force_n * places, bed.x_mm, bed.y_mm, PER).cells_n for places in (bed.x_mm, bed.y_mm[:, None])
-        )
-        force = there.cells_n
+        """Let the bed push the link in the next step."""
+        bed, plan = self.beds[name], self.plans[name]
+        pose = self._pose(plan)
+        force = bed.forces_n(bed.depths_m(things, pose.point_m, pose.rotation))
         at = force > 0
-        fingers = np.stack([x[at] / force[at], y[at] / force[at], np.zeros(at.sum()), force[at]], axis=1)
-        self.sheets[name].touch([Finger(*one) for one in fingers.tolist()])
-        return there
+        each = -force[at, None] * pose.turn(bed.normals[at])
+        body = self.data.body(plan.frame)
+        arms = pose.apply(bed.points_m[at]) - body.xipos
+        body.xfrc_applied[:] = [*each.sum(axis=0), *np.cross(arms, each).sum(axis=0)]
+        return Patches(force.reshape(len(bed.y_mm), -1), bed.x_mm, bed.y_mm, PER)
+
+    def _read(self, name: str) -> Zones:
+        """The newest frame with readings, all of it from after the touch."""
+        worn = self.sheets[name]
+        from_us = 1e6 * (worn.clock() + STALE_S)
+        worn.run(worn.clock() + READ_S)
+        found = None
+        with contextlib.suppress(ReadTimeout):
+            while True:
+                zones = worn.board.next(0)
+                if zones.units and min(zones.time_us, zones.units.time_us) > from_us:
+                    found = zones
+        assert found is not None
+        return found
 
     def _wrenches(
         self, name: str, cells: np.ndarray, supports: list[Support], zones: Zones
@@ -187,6 +198,17 @@ class Stand:
             assert between is not None
             hits += [bool(low <= value <= high) for value, (low, high) in zip(true, between)]
         return (hits, []) if len(supports) == 1 else ([], hits)
+
+
+def _fingers(there: Patches) -> list[Finger]:
+    """A finger for each cell, at the center of what presses there."""
+    force = there.cells_n
+    at = force > 0
+    x, y = (
+        there._replace(force_n=there.force_n * places).cells_n[at] / force[at]
+        for places in (there.x_mm, there.y_mm[:, None])
+    )
+    return [Finger(*one, 0.0, push) for *one, push in zip(x.tolist(), y.tolist(), force[at].tolist())]
 
 
 def flattened(support: Support, plan: Plan) -> Support:
