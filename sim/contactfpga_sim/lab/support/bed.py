@@ -124,12 +124,26 @@ class Bed:
         points, normals = plan.laid.place(*np.meshgrid(self.x_mm, self.y_mm))
         self.points_m = plan.pose.apply(1e-3 * np.asarray(points)).reshape(-1, 3)
         self.normals = plan.pose.turn(np.asarray(normals)).reshape(-1, 3)
+        rows, columns = (np.arange(per * lines) // per for lines in (plan.skin.rows, plan.skin.columns))
+        self.cell = (plan.skin.columns * rows[:, None] + columns).ravel()
         self.area_m2 = (1e-3 * plan.skin.pitch_x_mm / per) ** 2
+
+    def keep(self, near: np.ndarray) -> None:
+        """Forget all other places, by (n,) bool."""
+        self.points_m, self.normals, self.cell = self.points_m[near], self.normals[near], self.cell[near]
+
+    def cells_n(self, forces_n: Floats) -> Floats:
+        """(rows, columns) force on each cell, of (n,) forces at the places."""
+        shape = self.plan.skin.rows, self.plan.skin.columns
+        return np.bincount(self.cell, forces_n, math.prod(shape)).reshape(shape)
 
     def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats) -> Floats:
         """(n,): the depth at each place, of a link at this pose in the world."""
-        points, normals = position_m + self.points_m @ rotation.T, self.normals @ rotation.T
-        return np.max([one.depth_m(points, normals, FOAM_M) for one in things], axis=0, initial=0.0)
+        found = np.zeros(len(self.points_m))
+        for one in things:
+            own = Thing(one.half_m, rotation.T @ one.rotation, rotation.T @ (one.point_m - position_m))
+            found = np.maximum(found, own.depth_m(self.points_m, self.normals, FOAM_M))
+        return found
 
     def forces_n(self, depths_m: Floats) -> Floats:
         """The force at each place, by p = E e/(1 - e), straight on from :data:`SOLID`."""

@@ -126,11 +126,12 @@ def drawn(design: str, model: str, kind: str, number: int) -> Drawn:
     limits = Cells(cover, skin.rows, skin.columns, 1e-3 * pitch, 1e-3 * pitch, number).thresholds_n
     cells = there.cells_n >= limits
     supports = ContactSurfaces(skin.sheet, cover).supports(frame_of(cells, skin))
-    return Drawn(there, cells, supports, rectangles(cells, pitch, cover))
+    extents = extents_of(cells, pitch)
+    return Drawn(there, cells, supports, ContactSurfaces(extents.sheet, cover).supports(extents))
 
 
-def rectangles(cells: np.ndarray, pitch_mm: float, cover: Cover) -> list[Support]:
-    """The supports of (rows, columns) bool cells of a flat sheet that sends only the extents of its zones."""
+def extents_of(cells: np.ndarray, pitch_mm: float) -> Zones:
+    """The frame of (rows, columns) bool cells of a flat sheet that sends only moments and extents of its zones."""
     rows, columns = cells.shape
     size = {"rows": rows, "columns": columns, "pitch_x_mm": pitch_mm, "pitch_y_mm": pitch_mm}
     skin = Skin(**size, connectivity=4, zone_capacity=MOST_ZONES, extent=True)
@@ -138,7 +139,7 @@ def rectangles(cells: np.ndarray, pitch_mm: float, cover: Cover) -> list[Support
     moments = np.array([(each.area, each.sum_x, each.sum_y) for each in departures], np.int64).reshape(-1, 3)
     extents = np.array([each.extent for each in departures], np.int64).reshape(-1, 4)
     frame = Frame(0, 0, frozenset(), 0, 0, len(moments), int(cells.sum()), moments, None, None, extents)
-    return ContactSurfaces(skin.sheet, cover).supports(Zones(frame, skin.sheet, 0))
+    return Zones(frame, skin.sheet, 0)
 
 
 def outcome(found: Drawn, pitch_mm: float) -> Outcome:

@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from contactfpga.errors import ReadTimeout
 from contactfpga.mujoco import Sheets, wear
-from contactfpga.robot.body import Body, LinkState, Snapshot, Support
+from contactfpga.robot.body import Body, ContactSurfaces, LinkState, Snapshot, Support
 from contactfpga.robot.body.kinematics import Pose, rotation_about
 from contactfpga.robot.body.plan import Plan
 from contactfpga.surfaces.shapes import Floats
@@ -130,6 +130,15 @@ class Stand:
             kinds[name], found = drawn(plan, self.beds[name], rng)
             pose = self._pose(plan)
             things[name] = [Thing(one.half_m, pose.turn(one.rotation.T).T, pose.apply(one.point_m)) for one in found]
+        data.qfrc_applied[:] = 0
+        for name in things:
+            self._press(name, things[name])
+        mujoco.mj_forward(self.model, data)
+        pushed = np.zeros(self.model.nv)
+        for plan in self.plans.values():
+            link = data.body(plan.frame)
+            mujoco.mj_applyFT(self.model, data, *np.split(link.xfrc_applied, 2), link.xipos, link.id, pushed)
+        data.qfrc_applied[:] = data.qfrc_bias - pushed  # the motors carry weight and support
         for _ in range(SETTLING):
             there = {name: self._press(name, things[name]) for name in things}
             mujoco.mj_step(self.model, data)
@@ -144,7 +153,8 @@ class Stand:
         for name, zones in frames.items():
             supports, cells = snapshot.supports("link", [name]), zones.cells
             flat = [flattened(one, self.plans[name]) for one in supports]
-            rectangles = compute.rectangles(cells, PITCH_MM, COVER)
+            extents = compute.extents_of(cells, PITCH_MM)
+            rectangles = ContactSurfaces(extents.sheet, COVER).supports(extents)
             judged = compute.outcome(compute.Drawn(there[name], cells, flat, rectangles), PITCH_MM)
             found.append(Lean(name, kinds[name], judged, *self._wrenches(name, cells, supports, zones)))
         return found
