@@ -99,15 +99,15 @@ class Thing:
 
     def depth_m(self, points_m: Floats, normals: Floats, most_m: float) -> Floats:
         """(n,): how far it reaches into columns of foam that end at (n, 3) points with these outward normals."""
-        start, way = (points_m - self.point_m) @ self.rotation, -normals @ self.rotation
+        start, way = self.rotation.T @ (points_m - self.point_m).T, -self.rotation.T @ normals.T
         with np.errstate(divide="ignore", invalid="ignore"):
             if isinstance(self.half_m, float):
-                a, b = (way[:, 1:] ** 2).sum(axis=1), (way[:, 1:] * start[:, 1:]).sum(axis=1)
-                root = np.sqrt(b**2 - a * ((start[:, 1:] ** 2).sum(axis=1) - self.half_m**2))
+                a, b = (way[1:] ** 2).sum(axis=0), (way[1:] * start[1:]).sum(axis=0)
+                root = np.sqrt(b**2 - a * ((start[1:] ** 2).sum(axis=0) - self.half_m**2))
                 enters, leaves = (-b - root) / a, (-b + root) / a
             else:
-                ends = (np.array([[-1.0], [1.0]])[..., None] * self.half_m - start) / way
-                enters, leaves = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+                middle, half = -start / way, np.array(self.half_m)[:, None] / np.abs(way)
+                enters, leaves = (middle - half).max(axis=0), (middle + half).min(axis=0)
         inside = (enters < leaves) & (leaves > 0) & (enters < most_m)
         return np.where(inside, np.minimum(leaves, most_m), 0.0)
 

@@ -8,6 +8,7 @@ it out between ankles and forces on the table. The ways differ only in the place
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import tempfile
 from pathlib import Path
@@ -18,8 +19,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from contactfpga.design.cover import Cells
-from contactfpga.robot.body import Body, ContactSurfaces
-from contactfpga.robot.body import polygons
+from contactfpga.robot.body import Body, ContactSurfaces, polygons
 from contactfpga.robot.body.kinematics import rotation_about
 from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps import pool
@@ -30,10 +30,9 @@ from contactfpga_sim.lab.support.bed import COVER, PITCH_MM, Bed, Thing, humanoi
 WAYS = ("without skin", "barycenter", "rectangle", "polygon")
 DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0.4))
 """Of the push, to the left of straight ahead, and where it acts on the trunk: y, and z above the waist's joint."""
-IMPULSES_NS = tuple(4.0 * number for number in range(16))
-SEEDS, PIECE = 72, 4
-"""Robots on a table or a rail of their own, and robots per piece of work; each is pushed in one direction at one
-point."""
+IMPULSES_NS = tuple(10.0 * number for number in range(16))
+SEEDS = 27
+"""Robots on a table or a rail of their own; each direction and point has as many."""
 
 STEP_S, CONTROL_STEPS = 2e-3, 5
 SETTLED_S, PUSH_S, AFTER_S = 0.5, 0.1, 3.0
@@ -51,12 +50,8 @@ BELOW = 0.4
 """Least cosine between straight down and the normal of what may touch the table, in the forearm that leans."""
 SPREADS, SEARCH_N = 1e-3, 15.0
 """Weight of the squared forces in N2 beside squared moments in Nm2, and push where no contact is known."""
-
-
-class Push(NamedTuple):
-    way: str
-    seed: int
-    impulse_ns: float
+RAYS = np.array([[TRUSTED_FRICTION, 0, -TRUSTED_FRICTION, 0], [0, TRUSTED_FRICTION, 0, -TRUSTED_FRICTION], [1.0] * 4])
+"""(3, 4): the forces, as columns, of which the controller adds up what the table exerts at a place."""
 
 
 @functools.cache
@@ -80,6 +75,12 @@ def _model() -> tuple[mujoco.MjModel, Bed, Floats]:
     bed = Bed(body.links["forearm"], 2)
     bed.keep(-bed.normals[:, 0] > BELOW)
     return model, bed, rest
+
+
+def _turning(vector: Floats) -> Floats:
+    """(3, 3): the matrix whose product with another vector is the cross product."""
+    x, y, z = vector.tolist()
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 class Braced:
@@ -128,7 +129,7 @@ class Braced:
         force = bed.forces_n(bed.depths_m([self.thing], self.link.xpos, rotation))
         at = np.flatnonzero(force)
         arms, normals = bed.points_m[at] @ rotation.T, bed.normals[at] @ rotation.T
-        moves = self.linear @ self.data.qvel + np.cross(self.angular @ self.data.qvel, arms)
+        moves = self.linear @ self.data.qvel + arms @ _turning(self.angular @ self.data.qvel).T
         inward = (moves * normals).sum(axis=1)
         push = np.maximum(force[at] + FOAM_NS_M * inward, 0.0)
         aside = moves - inward[:, None] * normals
@@ -139,8 +140,9 @@ class Braced:
         self.slid_m[:] = 0.0
         self.slid_m[at] = slid * holds[:, None]
         each = drag * holds[:, None] - push[:, None] * normals
-        from_middle = arms + self.link.xpos - self.link.xipos
-        self.link.xfrc_applied[:] = [*each.sum(axis=0), *np.cross(from_middle, each).sum(axis=0)]
+        moments = (arms + self.link.xpos - self.link.xipos).T @ each
+        turn = moments - moments.T
+        self.link.xfrc_applied[:] = [*each.sum(axis=0), turn[1, 2], turn[2, 0], turn[0, 1]]
         self.cells = bed.cells_n(force) >= self.closes_n
 
     # ---- the controller
@@ -168,13 +170,8 @@ class Braced:
         known = len(places) > 0
         arms = (places if known else self.planned.mean(axis=0)[None]) @ rotation.T
         corners = polygons.hull((x, y) for x, y, _ in arms.tolist())
-        height = float(arms[:, 2].mean())
-        rays = [(TRUSTED_FRICTION * x, TRUSTED_FRICTION * y, 1.0) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
-        turned = []  # what a force of 1 N along each ray exerts on each joint
-        for corner in corners:
-            point = self.linear - np.cross([*corner, height], self.angular.T).T
-            turned += [point.T @ ray for ray in rays]
-        exerts = np.array(turned).T
+        at = np.column_stack([corners, np.full(len(corners), arms[:, 2].mean())])
+        exerts = np.concatenate([self.linear.T @ RAYS + self.angular.T @ _turning(one) @ RAYS for one in at], axis=1)
         rest = wanted - np.clip(wanted, -ANKLE_NM / 2, ANKLE_NM / 2)
         if known:
             spread = math.sqrt(SPREADS) * np.eye(exerts.shape[1])
@@ -205,3 +202,28 @@ class Braced:
             if not self._head() > UPRIGHT * self.head_m:
                 return False
         return True
+
+
+class Robot(NamedTuple):
+    way: str
+    seed: int
+
+
+def survived(robot: Robot) -> float:
+    """The largest of :data:`IMPULSES_NS` that this robot stands, by halving: it falls at all that are larger than one
+    at which it falls. -1 if it does not stand at all."""
+    direction, point = list(itertools.product(DIRECTIONS_DEG, POINTS_M))[robot.seed % 9]
+    low, high = -1, len(IMPULSES_NS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        stands = Braced(*robot).stands(IMPULSES_NS[middle], direction, point)
+        low, high = (middle, high) if stands else (low, middle)
+    return IMPULSES_NS[low] if low >= 0 else -1.0
+
+
+def survive_all() -> dict[str, list[float]]:
+    """:func:`survived` of all seeds by way."""
+    robots = [Robot(way, seed) for way in WAYS for seed in range(SEEDS)]
+    with pool.executor() as workers:
+        found = iter(list(workers.map(survived, robots)))
+    return {way: [next(found) for _ in range(SEEDS)] for way in WAYS}
