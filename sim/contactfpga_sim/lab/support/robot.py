@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -78,8 +78,8 @@ def thing(kind: str, rng: np.random.Generator, point_m: Floats, normal: Floats) 
 
 def pressed(one: Thing, bed: Bed, normal: Floats, force_n: float) -> Thing:
     """The thing, moved along the normal until it presses with this force on a link at the origin."""
-    low, high = -0.005, 0.01
-    for _ in range(16):
+    low, high = -0.03, 0.01
+    for _ in range(18):
         middle = (low + high) / 2
         one = dataclasses.replace(one, point_m=one.point_m - middle * normal)
         total = bed.forces_n(bed.depths_m([one], np.zeros(3), np.eye(3))).sum()
@@ -104,10 +104,11 @@ def drawn(plan: Plan, bed: Bed, rng: np.random.Generator) -> tuple[str, list[Thi
 
 
 class Stand:
-    """JVRC-1 in MuJoCo, its pelvis held, with sheets on :data:`LINKS`."""
+    """JVRC-1 in MuJoCo, its pelvis held, with sheets on some of :data:`LINKS`."""
 
-    def __init__(self, folder: Path):
-        path = write_robot(folder, list(LINKS), units=True)
+    def __init__(self, folder: Path, names: Sequence[str], seed: int):
+        """``seed``: of the switches' forces and the units' noise."""
+        path = write_robot(folder, names, units=True)
         self.plans = Body.load(path).links
         spec = humanoid(Body.load(path).urdf)
         spec.option.timestep = 1e-3
@@ -116,7 +117,7 @@ class Stand:
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # the bed presses in their place
         self.data = mujoco.MjData(self.model)
         self.model.jnt_stiffness[:], self.model.dof_damping[:] = STIFF_NM, DAMPED_NMS
-        self.sheets = Sheets(self.model, self.data, path, radius_m=1e-4)
+        self.sheets = Sheets(self.model, self.data, path, radius_m=1e-4, seed=seed)
         self.beds = {name: Bed(plan, PER) for name, plan in self.plans.items()}
 
     def lean(self, number: int) -> list[Lean]:
@@ -151,6 +152,8 @@ class Stand:
         snapshot = Snapshot(self.sheets.body, 0.0, states)
         found = []
         for name, zones in frames.items():
+            if not there[name].force_n.any():
+                continue  # the link sprang off
             supports, cells = snapshot.supports("link", [name]), zones.cells
             flat = [flattened(one, self.plans[name]) for one in supports]
             extents = compute.extents_of(cells, PITCH_MM)
@@ -230,15 +233,12 @@ def flattened(support: Support, plan: Plan) -> Support:
     return dataclasses.replace(support, corners_m=np.stack([radius * angle, own[:, 2], 0 * angle], axis=1))
 
 
-@functools.cache
-def stand() -> Stand:
-    """One for each process."""
-    with tempfile.TemporaryDirectory() as folder:
-        return Stand(Path(folder))
-
-
 def leans(first: int) -> list[Lean]:
-    return [one for number in range(first, first + PIECE) for one in stand().lean(number)]
+    """The leans of a piece of work, whose first pose has this number, on sheets of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        stand = Stand(Path(folder), list(LINKS), first)
+    with stand.sheets:
+        return [one for number in range(first, first + PIECE) for one in stand.lean(number)]
 
 
 def lean_all() -> list[Lean]:
