@@ -18,6 +18,7 @@ import numpy as np
 
 from contactfpga.design.cover import Switch
 from contactfpga.design.cover.press import SOLID
+from contactfpga.robot.body import Body
 from contactfpga.robot.body.plan import Plan
 from contactfpga.skin import Skin
 from contactfpga.surfaces.shapes import Floats
@@ -77,9 +78,10 @@ def _units(frame: str, middle_m: float) -> str:
     return text
 
 
-def humanoid(urdf: str | Path) -> Any:
-    """The ``MjSpec`` of a URDF without its shapes."""
-    tree = ET.parse(urdf).getroot()
+def humanoid(body: Body) -> Any:
+    """The ``MjSpec`` of a robot's URDF without its shapes."""
+    assert body.urdf is not None
+    tree = ET.parse(body.urdf).getroot()
     for link in tree.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)
@@ -135,7 +137,7 @@ class Bed:
     def cells_n(self, forces_n: Floats) -> Floats:
         """(rows, columns) force on each cell, of (n,) forces at the places."""
         shape = self.plan.skin.rows, self.plan.skin.columns
-        return np.bincount(self.cell, forces_n, math.prod(shape)).reshape(shape)
+        return np.asarray(np.bincount(self.cell, forces_n, math.prod(shape)).reshape(shape), float)
 
     def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats) -> Floats:
         """(n,): the depth at each place, of a link at this pose in the world."""

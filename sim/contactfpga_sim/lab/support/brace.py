@@ -25,7 +25,7 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.body.folding import frame_of
 from contactfpga_sim.lab.support import compute
-from contactfpga_sim.lab.support.bed import COVER, PITCH_MM, Bed, Thing, humanoid, write_robot
+from contactfpga_sim.lab.support.bed import COVER, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
 
 WAYS = ("without skin", "barycenter", "rectangle", "polygon")
 DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0.4))
@@ -59,7 +59,7 @@ def _model() -> tuple[mujoco.MjModel, Bed, Floats]:
     """The robot, the bed of its forearm, and the angles in which it leans."""
     with tempfile.TemporaryDirectory() as folder:
         body = Body.load(write_robot(Path(folder), ["forearm"], units=False))
-    spec = humanoid(body.urdf)
+    spec = humanoid(body)
     for coupling in spec.equalities:
         spec.delete(coupling)
     for joint in spec.joints:
@@ -113,7 +113,7 @@ class Braced:
         turn = rotation_about((0, 0, 1), rng.uniform(-0.7, 0.7))
         crossing = self.link.xpos + [along - half[0] if edge else along, 0, 0]
         away = turn @ [half[0] if edge else 0.0, 0, 0]
-        top = self.link.xpos[2] - 1e-3 * self.plan.skin.radius_mm + 5e-4
+        top = self.link.xpos[2] - 1e-3 * LINKS["forearm"][1] + 5e-4
         return Thing(tuple(half.tolist()), turn, np.array([*(crossing + away)[:2], top - half[2]]))
 
     def _head(self) -> float:

@@ -110,7 +110,7 @@ class Stand:
         """``seed``: of the switches' forces and the units' noise."""
         path = write_robot(folder, names, units=True)
         self.plans = Body.load(path).links
-        spec = humanoid(Body.load(path).urdf)
+        spec = humanoid(Body.load(path))
         spec.option.timestep = 1e-3
         wear(spec, path)
         self.model = spec.compile()
@@ -150,17 +150,18 @@ class Stand:
         frames = {name: self._read(name) for name in things}
         states = {name: LinkState(zones, 0.0, "ok", frame_s=0.0) for name, zones in frames.items()}
         snapshot = Snapshot(self.sheets.body, 0.0, states)
-        found = []
+        leant = []
         for name, zones in frames.items():
             if not there[name].force_n.any():
                 continue  # the link sprang off
             supports, cells = snapshot.supports("link", [name]), zones.cells
+            assert cells is not None
             flat = [flattened(one, self.plans[name]) for one in supports]
             extents = compute.extents_of(cells, PITCH_MM)
             rectangles = ContactSurfaces(extents.sheet, COVER).supports(extents)
             judged = compute.outcome(compute.Drawn(there[name], cells, flat, rectangles), PITCH_MM)
-            found.append(Lean(name, kinds[name], judged, *self._wrenches(name, cells, supports, zones)))
-        return found
+            leant.append(Lean(name, kinds[name], judged, *self._wrenches(name, cells, supports, zones)))
+        return leant
 
     def _pose(self, plan: Plan) -> Pose:
         return Pose(self.data.body(plan.frame).xmat.reshape(3, 3).copy(), self.data.body(plan.frame).xpos.copy())
@@ -217,11 +218,11 @@ def _fingers(there: Patches) -> list[Finger]:
     """A finger for each cell, at the center of what presses there."""
     force = there.cells_n
     at = force > 0
-    x, y = (
+    places = [
         there._replace(force_n=there.force_n * places).cells_n[at] / force[at]
         for places in (there.x_mm, there.y_mm[:, None])
-    )
-    return [Finger(*one, 0.0, push) for *one, push in zip(x.tolist(), y.tolist(), force[at].tolist())]
+    ]
+    return [Finger(x, y, 0.0, push) for x, y, push in np.stack([*places, force[at]], axis=1).tolist()]
 
 
 def flattened(support: Support, plan: Plan) -> Support:
