@@ -13,7 +13,7 @@ pytest.importorskip("jvrc_description")
 
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga_sim.lab.support import brace, compute, robot
-from contactfpga_sim.lab.support.bed import COVER, PITCH_MM, Thing
+from contactfpga_sim.lab.support.bed import PITCH_MM, Thing
 from contactfpga_sim.lab.support.tables import braces_table, leans_table
 
 
@@ -57,8 +57,7 @@ def test_a_sample_of_the_leans_comes_by_gateware_and_driver_and_comes_again(lean
 
 
 def test_a_polygon_that_is_a_pitch_too_small_is_seen():
-    """At the edge of a plate half a pitch of the contact's outline lies beyond the middles of its cells."""
-    kind, found = "plate", compute.drawn("6.4 mm, 0.4 N", "model", "plate", 0)
+    found = compute.drawn("6.4 mm, 0.4 N", "model", "bar", 0)
     small = [
         dataclasses.replace(
             one,
@@ -67,8 +66,8 @@ def test_a_polygon_that_is_a_pitch_too_small_is_seen():
         )
         for one in found.supports
     ]
-    assert all(compute.outcome(found, PITCH_MM).held), kind
-    assert not all(compute.outcome(found._replace(supports=small), PITCH_MM).held)
+    assert compute.outcome(found, PITCH_MM).held == [True]
+    assert compute.outcome(found._replace(supports=small), PITCH_MM).held == [False]
 
 
 def test_the_table_carries_what_the_arm_presses_and_friction_holds_it():
@@ -79,7 +78,7 @@ def test_the_table_carries_what_the_arm_presses_and_friction_holds_it():
     weight = 9.81 * braced.model.body_mass.sum()
     assert 20 < force[2] < weight
     assert math.hypot(*force[:2]) <= brace.FRICTION * force[2] * 1.05
-    assert np.abs(braced.data.qvel).max() < 0.1
+    assert np.abs(braced.data.qvel[:2]).max() < 0.05
 
 
 def test_without_its_arm_the_robot_falls_and_a_huge_push_fells_it(monkeypatch):
@@ -116,4 +115,3 @@ def test_the_table_of_braces_has_the_worst_way_first():
     text = braces_table({"good": [80.0] * 9, "bad": [-1.0, *[30.0] * 8]})
     assert text.index("| bad | 30 ") < text.index("| good | 80 ")
     assert "1 of 9" in text
-    assert COVER.cut

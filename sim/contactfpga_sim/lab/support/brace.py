@@ -103,7 +103,7 @@ class Braced:
         ends = np.array([[x, y] for x in (-0.01, 0.01) for y in (0.0, 2 * middle)])
         self.planned = np.array([self.plan.place(1e3 * (middle + x), 1e3 * y)[0] for x, y in ends])
         self.known = b"", np.zeros((0, 3))
-        self.head_m = float(self._head())
+        self.head_m = self._head()
 
     def _table(self, rng: np.random.Generator) -> Thing:
         """A table whose edge crosses the forearm, or a rail across it, at a random place and angle."""

@@ -78,14 +78,16 @@ def thing(kind: str, rng: np.random.Generator, point_m: Floats, normal: Floats) 
 
 def pressed(one: Thing, bed: Bed, normal: Floats, force_n: float) -> Thing:
     """The thing, moved along the normal until it presses with this force on a link at the origin."""
+
+    def moved(by_m: float) -> Thing:
+        return dataclasses.replace(one, point_m=one.point_m - by_m * normal)
+
     low, high = -0.03, 0.01
     for _ in range(18):
         middle = (low + high) / 2
-        one = dataclasses.replace(one, point_m=one.point_m - middle * normal)
-        total = bed.forces_n(bed.depths_m([one], np.zeros(3), np.eye(3))).sum()
-        one = dataclasses.replace(one, point_m=one.point_m + middle * normal)
-        low, high = (middle, high) if total < force_n else (low, middle)
-    return dataclasses.replace(one, point_m=one.point_m - low * normal)
+        force = bed.forces_n(bed.depths_m([moved(middle)], np.zeros(3), np.eye(3))).sum()
+        low, high = (middle, high) if force < force_n else (low, middle)
+    return moved(low)
 
 
 def drawn(plan: Plan, bed: Bed, rng: np.random.Generator) -> tuple[str, list[Thing]]:
