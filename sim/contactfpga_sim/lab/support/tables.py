@@ -82,7 +82,7 @@ def leans_table(found: list[robot.Lean] | None = None) -> writer.Table:
     for link, kind in itertools.product(by_link, sorted(kinds)):
         if mine := [one for one in by_link[link] if one.kind == kind]:
             rows.append([link, kind, *_lean(mine)])
-    return writer.Table(head, rows, lambda row: row[1] == "all")
+    return writer.Table(head, rows, lambda row: row[1] == "all", [name for name in head if name != "supports"])
 
 
 def _zones(found: Sequence[robot.Lean]) -> list[compute.Zone]:
