@@ -15,7 +15,7 @@ from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.apps import pool
-from contactfpga_sim.apps.covers import tiled
+from contactfpga_sim.apps.covers import MOST_ZONES, tiled
 from contactfpga_sim.lab.benchmark.pressed import Patches, patches
 from contactfpga_sim.lab.body.folding import frame_of
 from contactfpga_sim.lab.chart.methods import sheet
@@ -125,15 +125,21 @@ def drawn(design: str, model: str, kind: str, number: int) -> Drawn:
     there = patches(one, skin) if model == "elements" else modeled(one, skin, cover)
     limits = Cells(cover, skin.rows, skin.columns, 1e-3 * pitch, 1e-3 * pitch, number).thresholds_n
     cells = there.cells_n >= limits
-    plain = sheet(pitch, extent=True)
-    departures = labelling(cells, plain.connectivity).departures
+    supports = ContactSurfaces(skin.sheet, cover).supports(frame_of(cells, skin))
+    extents = extents_of(cells, pitch)
+    return Drawn(there, cells, supports, ContactSurfaces(extents.sheet, cover).supports(extents))
+
+
+def extents_of(cells: np.ndarray, pitch_mm: float) -> Zones:
+    """The frame of (rows, columns) bool cells of a flat sheet that sends only moments and extents of its zones."""
+    rows, columns = cells.shape
+    size = {"rows": rows, "columns": columns, "pitch_x_mm": pitch_mm, "pitch_y_mm": pitch_mm}
+    skin = Skin(**size, connectivity=4, zone_capacity=MOST_ZONES, extent=True)
+    departures = labelling(cells, skin.connectivity).departures
     moments = np.array([(each.area, each.sum_x, each.sum_y) for each in departures], np.int64).reshape(-1, 3)
     extents = np.array([each.extent for each in departures], np.int64).reshape(-1, 4)
     frame = Frame(0, 0, frozenset(), 0, 0, len(moments), int(cells.sum()), moments, None, None, extents)
-    both = (ContactSurfaces(one.sheet, cover).supports(zones) for one, zones in (
-        (skin, frame_of(cells, skin)), (plain, Zones(frame, plain.sheet, 0))
-    ))  # fmt: skip
-    return Drawn(there, cells, *both)
+    return Zones(frame, skin.sheet, 0)
 
 
 def outcome(found: Drawn, pitch_mm: float) -> Outcome:

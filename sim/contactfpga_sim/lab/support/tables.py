@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from matplotlib.patches import Polygon, Rectangle
 from contactfpga import picture_style as style
 from contactfpga_sim.apps.stats import quantile, wilson
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.support import compute
+from contactfpga_sim.lab.support import brace, compute, robot
 from contactfpga_sim.lab.support.compute import DESIGNS, MODELS, Outcome
 
 SHOWN = (
@@ -67,6 +68,56 @@ def _ratio(values: Sequence[float]) -> str:
 def _least(shares: Sequence[float]) -> str:
     half, least = quantile(shares, 0.5), quantile(shares, 0.01)
     return f"{100 * half.value:.0f} %; {100 * least.value:.0f} % (up to {100 * least.high:.0f})"
+
+
+def leans_table(found: list[robot.Lean] | None = None) -> writer.Table:
+    """A row for each link and kind of support; the page has those of each link, the worst first."""
+    found = robot.lean_all() if found is None else found
+    head = ["link", "supports", "felt", "center in the polygon", "held", "area", "area of the rectangle"]
+    head += ["wrench, one zone", "wrench, several zones"]
+    links, kinds = ([*dict.fromkeys(getattr(one, field) for one in found)] for field in ("link", "kind"))
+    by_link = {link: [one for one in found if one.link == link] for link in links}
+    by_link = dict(sorted(by_link.items(), key=lambda item: np.mean([z.center for z in _zones(item[1])])))
+    rows = [[link, "all", *_lean(mine)] for link, mine in by_link.items()]
+    for link, kind in itertools.product(by_link, sorted(kinds)):
+        if mine := [one for one in by_link[link] if one.kind == kind]:
+            rows.append([link, kind, *_lean(mine)])
+    return writer.Table(head, rows, lambda row: row[1] == "all", [name for name in head if name != "supports"])
+
+
+def _zones(found: Sequence[robot.Lean]) -> list[compute.Zone]:
+    return [zone for one in found for zone in one.outcome.zones]
+
+
+def _lean(found: Sequence[robot.Lean]) -> list[str]:
+    zones = _zones(found)
+    return [
+        _share([share > 0 for one in found for share in one.outcome.force]),
+        _share([zone.center for zone in zones]),
+        _share([held for one in found for held in one.outcome.held]),
+        *(_ratio([zone[field] for zone in zones]) for field in (1, 2)),
+        *(_components([hit for one in found for hit in getattr(one, which)]) for which in ("alone", "among")),
+    ]
+
+
+def _components(hits: Sequence[bool]) -> str:
+    """A share of components of wrenches, with the interval of as many wrenches, as the six of one are not apart."""
+    if not hits:
+        return "none"
+    count = len(hits) // 6
+    low, high = wilson(round(float(np.mean(hits)) * count), count)
+    return f"{100 * np.mean(hits):.1f} % of {count} ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def braces_table(found: dict[str, list[float]] | None = None) -> str:
+    """The push that half of the robots stand, by way, the worst first."""
+    found = brace.survive_all() if found is None else found
+    rows = [["force may act", "impulse that half of them stand, Ns", "a quarter", "fall without a push"]]
+    for way, stood in sorted(found.items(), key=lambda item: float(np.median(item[1]))):
+        half, least = (quantile(stood, share) for share in (0.5, 0.25))
+        cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in (half, least))
+        rows.append([way, *cells, f"{sum(one < 0 for one in stood)} of {len(stood)}"])
+    return writer.table_of(rows)
 
 
 def draw(folder: Path) -> list[Path]:
