@@ -151,6 +151,26 @@ def palm(skin: Skin) -> Scene:
     return Scene((Contact(shape=contacts.palm(), x_mm=width / 2, y_mm=height / 2 - 8, force_n=40.0),))
 
 
+def palm_and_fingers(skin: Skin) -> Scene:
+    """The flat of a hand below two fingertips, of which the left one presses twice as hard; as large as fits."""
+    width, height = _extent(skin)
+    scale = min(1.0, max(0.1, min(width, height) / 160))
+    y, fingertip = height / 2 - 60 * scale, contacts.disc(FINGER_MM * scale)
+    palm = Contact(
+        shape=contacts.palm(scale), body="palm", x_mm=width / 2, y_mm=height / 2 + 20 * scale, force_n=60.0 * scale**2
+    )
+    pressed = ((-35, 20.0), (35, 10.0))
+    return Scene(
+        (
+            palm,
+            *(
+                Contact(shape=fingertip, x_mm=width / 2 + x * scale, y_mm=y, force_n=force * scale**2)
+                for x, force in pressed
+            ),
+        )
+    )
+
+
 def sole(skin: Skin) -> Scene:
     """A bare foot in the middle, along the longer side, as long as fits."""
     width, height = _extent(skin)
@@ -206,7 +226,7 @@ def grip(skin: Skin) -> Scene:
 
 
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
-    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
+    scene.__name__: scene for scene in (fingertip, two_fingers, palm, palm_and_fingers, sole, edge, moving, pushing, nothing)
 }
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
