@@ -105,7 +105,8 @@ class Timeline:
                     pieces[at] = np.tile(fall <= clock, (known.rows, 1))
                     if row == known.rows:
                         cuts[at] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), row))
-        return cls([(at, pieces[at], None) for at in sorted(pieces)], received, sorted(cuts.items(), key=min))
+        held = [(at, pieces[at], None) for at in sorted(pieces)]
+        return cls(held, received, [(at, cuts[at]) for at in sorted(cuts)])
 
     def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Cells and stuck columns in ``cycle``; None: none pressed."""
