@@ -88,9 +88,7 @@ class Timeline:
         return cls(pieces, received)
 
     @classmethod
-    def falling(
-        cls, skin: Skin, frames: Iterable[np.ndarray], received: Sequence[tuple[int, bytes]] = ()
-    ) -> Timeline:
+    def falling(cls, skin: Skin, frames: Iterable[np.ndarray], received: Sequence[tuple[int, bytes]] = ()) -> Timeline:
         """Frames of (row lines, columns) clocks, a guard row last, from selecting a row until its columns read
         pressed; what takes longer than the row does not. Each is held for one scan from power-up."""
         known = facts(skin)

@@ -226,7 +226,8 @@ def grip(skin: Skin) -> Scene:
 
 
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
-    scene.__name__: scene for scene in (fingertip, two_fingers, palm, palm_and_fingers, sole, edge, moving, pushing, nothing)
+    scene.__name__: scene
+    for scene in (fingertip, two_fingers, palm, palm_and_fingers, sole, edge, moving, pushing, nothing)
 }
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
