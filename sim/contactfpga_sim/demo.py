@@ -117,7 +117,9 @@ def _falls(name: str, skin: Skin) -> list[np.ndarray]:
     """Clocks for :meth:`Timeline.falling`: of the kit's film at rest, then under the scene."""
     kit = kits.kit("soft")
     cover, circuit = load_cover(kit.skin_path), load_circuit(kit.skin_path)
-    assert cover is not None and cover.cell is not None and circuit is not None
+    assert cover is not None
+    assert cover.cell is not None
+    assert circuit is not None
     sheet, scene = FallingSheet(skin, circuit, cover.cell), scenes.CONTACTS[name](skin)
     forces = [scenes.nothing(skin).forces_n(0.0, skin, cover), *[scene.forces_n(0.0, skin, cover)] * (SCANS - 1)]
     seconds = [sheet.times_s(sheet.ohm(force, 0.0))[:, : skin.columns] for force in forces]

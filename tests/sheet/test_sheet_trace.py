@@ -20,10 +20,11 @@ from contactfpga.design.circuit import load_circuit
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::SyntaxWarning")
 
-RULER_OHM, COLUMN_PF = 24_000.0, 220
+RULER_OHM, COLUMN_PF = 16_000.0, 220
 """Of the soft kit."""
 TILE = {"pitch_x_mm": 6.4, "pitch_y_mm": 6.4}
 CLOSED = {"surface": "cylinder", "closed": True}
+SAME_PINS = {"74HC595": "74LVC595A", "74HC165": ""}
 REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
 
 
@@ -150,7 +151,7 @@ def named_chips(board, skin, wires):
     ways = {"74HC595": ("row_data", skin.row_chains, 14, 9), "74HC165": ("column_data", skin.column_chains, 9, 10)}
     found = {}
     for kind, (port, chains, first, after) in ways.items():
-        names = [name for name in board.parts("U") if board.values[name] == kind]
+        names = [name for name in board.parts("U") if board.values[name] in (kind, SAME_PINS[kind])]
         starts = {board.pad(name, first): name for name in names}
         for chain in range(chains if names else 0):
             copper, number = wires[port if chains == 1 else f"{port}[{chain}]"], 0
