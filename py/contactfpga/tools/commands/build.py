@@ -167,7 +167,11 @@ class WiringTable:
         for sheet, skin in self._sheets:
             counted = ", ".join(f"{count} {name}" for name, count in wiring.parts(skin).items())
             terminal.say(f"{sheet and f'sheet {sheet}: '}{counted}", hang=2)
-        if self.circuit and self.circuit.pin_ohm <= LVC_OHM and self._outputs():
+        if (
+            self.circuit
+            and self.circuit.pin_ohm <= LVC_OHM
+            and any(one.chip == "74HC595" for _, one in self._outputs())
+        ):
             terminal.say(
                 f"Each 74HC595 is a {LVC595.order.partition(',')[0]}, with the same pins: pin_ohm asks for it."
             )

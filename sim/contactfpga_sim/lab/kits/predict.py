@@ -254,13 +254,10 @@ def _falling(kit: Kit, drawn: list[Circuit], rng: np.random.Generator) -> Iterat
     here = f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
     ruler_us = [1e6 * falling.ruler_s(one, *lines) for one in drawn]
     yield _made("ruler_us", "a guard row selected until the columns fall", ruler_us, "circuit", here)
-    tried, reader = (
-        np.geomspace(*TRIED_OHM, skin.rows * skin.columns).reshape(skin.rows, skin.columns),
-        LevelReader(skin),
-    )
-    leaks_a = (
-        1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (number > 0) for number, one in enumerate(drawn)
-    )
+    reader = LevelReader(skin)
+    tried = np.geomspace(*TRIED_OHM, skin.rows * skin.columns).reshape(skin.rows, skin.columns)
+    # the first circuit is the nominal one
+    leaks_a = [1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (one is not drawn[0]) for one in drawn]
     maps = [reader.read(tried, one, leak_a) for one, leak_a in zip(drawn, leaks_a, strict=True)]
     for level, sixteenths in enumerate(skin.derived.rulers, 1):
         name, of = (f"_{level}", f" for level {level}") if level > 1 else ("", "")

@@ -155,20 +155,12 @@ def palm_and_fingers(skin: Skin) -> Scene:
     """The flat of a hand below two fingertips, of which the left one presses twice as hard; as large as fits."""
     width, height = _extent(skin)
     scale = min(1.0, max(0.1, min(width, height) / 160))
-    y, fingertip = height / 2 - 60 * scale, contacts.disc(FINGER_MM * scale)
-    palm = Contact(
-        shape=contacts.palm(scale), body="palm", x_mm=width / 2, y_mm=height / 2 + 20 * scale, force_n=60.0 * scale**2
-    )
-    pressed = ((-35, 20.0), (35, 10.0))
-    return Scene(
-        (
-            palm,
-            *(
-                Contact(shape=fingertip, x_mm=width / 2 + x * scale, y_mm=y, force_n=force * scale**2)
-                for x, force in pressed
-            ),
-        )
-    )
+    x, y, hand = width / 2, height / 2, contacts.palm(scale)
+    found = [Contact(shape=hand, body="palm", x_mm=x, y_mm=y + 20 * scale, force_n=60 * scale**2)]
+    for side, force in ((-1, 20.0), (1, 10.0)):
+        tip, at_mm = contacts.disc(FINGER_MM * scale), x + side * 35 * scale
+        found.append(Contact(shape=tip, x_mm=at_mm, y_mm=y - 60 * scale, force_n=force * scale**2))
+    return Scene(tuple(found))
 
 
 def sole(skin: Skin) -> Scene:
