@@ -19,7 +19,7 @@ from contactfpga_sim.apps import errors, pool, result_cache, score
 from contactfpga_sim.apps.score import Interval, interval
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.benchmark import entries, scenes
-from contactfpga_sim.lab.benchmark.entries import GUARD, OLDER, TOUCHED
+from contactfpga_sim.lab.benchmark.entries import OLDER, TOUCHED
 from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.kits import predict
 from contactfpga_sim.lab.kits.film import LevelReader
@@ -33,14 +33,12 @@ KITS = ("starter", "soft")
 
 
 def _film_ohm(forces_n: np.ndarray, cell: ResistiveCell, *seeds: int) -> np.ndarray:
-    """Resistances of a film that is drawn, with preload and creep as :class:`~..benchmark.entries.Sensed` has them;
-    infinite of cells that are masked, since their preload alone is near the lightest level."""
+    """Resistances of a film that is drawn, with preload and creep as :class:`~..benchmark.entries.Sensed` has them."""
     rng, creep = np.random.default_rng(seeds), cell.creep / cell.exponent
     gain = np.exp(cell.spread / cell.exponent * rng.standard_normal(forces_n.shape))
     preload = cell.preload_n * np.abs(rng.standard_normal(forces_n.shape))
     touch, older = 1 + creep * rng.uniform(*TOUCHED), 1 + creep * rng.uniform(0, OLDER)
-    ohm = cell.ohm(gain * (np.maximum(forces_n, 0) * touch + preload * older))
-    return np.where(gain * preload / GUARD < cell.level_n, ohm, np.inf)
+    return cell.ohm(gain * (np.maximum(forces_n, 0) * touch + preload * older))
 
 
 Outcome = tuple[bool, bool, float]
