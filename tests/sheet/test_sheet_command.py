@@ -61,7 +61,7 @@ def test_a_sheet_with_a_ruler_has_combs_and_no_caps(tmp_path, capsys):
     assert all(number in bom for number in numbers)
     assert "74HC595" not in bom
     assert cli.main(["sheet", str(file), "-o", str(tmp_path), "--part", "tact"]) == 1
-    assert "ruler is 31; its sheet needs combs, not switches" in capsys.readouterr().err
+    assert "ruler is 74; its sheet needs combs, not switches" in capsys.readouterr().err
 
 
 def test_a_sheet_on_a_bed_has_feet_as_wide_as_its_pads(tmp_path, skin):

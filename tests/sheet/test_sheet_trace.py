@@ -193,12 +193,12 @@ RIBBON = {"1": 1, "7": 2, "2": 3, "8": 4, "3": 5, "9": 6, "4": 7, "10": 8, "5": 
 """Wire of a flat cable at each pin of a PMOD socket: 1 to 6 in one row, 7 to 12 in the other."""
 
 
-@pytest.mark.parametrize("name", ["starter", "soft"])
-def test_three_flat_cables_join_a_kit_to_its_board(tmp_path, name):
+@pytest.mark.parametrize(("name", "series"), [("starter", 33.0), ("soft", 4.7)])
+def test_three_flat_cables_join_a_kit_to_its_board(tmp_path, name, series):
     kit = kits.kit(name)
     written(tmp_path, kit.skin, circuit=load_circuit(kit.skin_path), board=kit.board)
     board = TracedBoard(tmp_path)
-    check_against_the_wiring_table(board, kit.skin, pulls={"column": 47_000.0})
+    check_against_the_wiring_table(board, kit.skin, series, pulls={"column": 47_000.0})
     sockets = {"PMOD1A": "J1", "PMOD1B": "J2", "PMOD2": "J3"}
     for wire in wiring.wires(kit.board, kit.skin):
         if wire.pin:
