@@ -11,6 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga import terminal
+from contactfpga.design import kits
+from contactfpga.design.circuit import load_circuit
+from contactfpga.design.cover import load_cover
 from contactfpga.driver import driver
 from contactfpga.robot.haptics import LoadCells, WithReadings, felt
 from contactfpga.shipped import examples
@@ -24,10 +27,12 @@ from contactfpga_sim.model.golden import Timeline, Trace, predict
 from contactfpga_sim.model.scenes import drawing
 from contactfpga_sim.model.scenes import scene as scenes
 from contactfpga_sim.model.scenes.felt import UnitReadings
+from contactfpga_sim.model.sheet.falling import FallingSheet
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
-FORCED = "pushing"
+FORCED, PRESSED = "pushing", "palm_and_fingers"
+"""Scenes on a sheet with pressure units, and on one whose cells tell levels of force."""
 
 LOOKS = 240
 """Clocks between two samples of the forces."""
@@ -73,7 +78,10 @@ def run(name: str, engine: str, skin: Skin) -> DemoResult:
     scene = scenes.scene(skin, name)
     untouched = np.zeros((skin.rows, skin.columns), bool)
     frames = [untouched, *(scene(index * scan / skin.clock_hz) for index in range(SCANS - 1))]
-    timeline = dataclasses.replace(Timeline.frames(skin, frames), units=_readings(name, skin, scan))
+    if skin.ruler:
+        timeline = Timeline.falling(skin, _falls(name, skin))
+    else:
+        timeline = dataclasses.replace(Timeline.frames(skin, frames), units=_readings(name, skin, scan))
     cycles = SCANS * scan + skin.derived.max_frame_bytes * 10 * skin.derived.bit_clocks
     trace = ENGINES[engine](skin, timeline, cycles)
     try:
@@ -105,7 +113,22 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
     return [(cycle, read(cycle / skin.clock_hz)) for cycle in range(0, SCANS * scan, LOOKS)]
 
 
+def _falls(name: str, skin: Skin) -> list[np.ndarray]:
+    """Clocks for :meth:`Timeline.falling`: of the kit's film at rest, then under the scene."""
+    kit = kits.kit("soft")
+    cover, circuit = load_cover(kit.skin_path), load_circuit(kit.skin_path)
+    assert cover is not None
+    assert cover.cell is not None
+    assert circuit is not None
+    sheet, scene = FallingSheet(skin, circuit, cover.cell), scenes.CONTACTS[name](skin)
+    forces = [scenes.nothing(skin).forces_n(0.0, skin, cover), *[scene.forces_n(0.0, skin, cover)] * (SCANS - 1)]
+    seconds = [sheet.times_s(sheet.ohm(force, 0.0))[:, : skin.columns] for force in forces]
+    return [np.ceil(np.minimum(one, 1.0) * skin.clock_hz).astype(int) for one in seconds]
+
+
 def skin_of(name: str) -> Skin:
+    if name == PRESSED:
+        return kits.kit("soft").skin
     if name in scenes.AROUND:
         return forearm()
     return with_force() if name == FORCED else Skin()
@@ -165,7 +188,7 @@ LEGEND = (
 
 TITLE = (
     "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud; "
-    f"{', '.join(scenes.AROUND)}: on a closed sheet"
+    f"{', '.join(scenes.AROUND)}: on a closed sheet; {PRESSED}: on the soft kit, 24 MHz, 6 Mbaud"
 )
 
 HEADS = (
@@ -178,7 +201,7 @@ VERDICT = HEADS.index("verdict")
 def rows_of(outcomes: list[DemoResult]) -> list[list[str]]:
     rows = [list(HEADS)]
     for out in outcomes:
-        zones = "-" if out.frame is None else str(out.frame.zones)
+        zones = "-" if out.frame is None else str(drawing.zones(out))
         late = "-" if out.last_record is None else f"{out.last_record} clocks"
         times = (f"{out.first_byte_us:.1f} us", f"{out.last_byte_us:.1f} us")
         verdict = "differs" if out.difference else "the same"

@@ -1,6 +1,7 @@
 """`make bitstream-replay`: netlists of boards against the golden model. Place and route is not needed here."""
 
 import re
+import shutil
 import sys
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import bitstream_path
+from contactfpga.design import kits
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin, SkinError
 from contactfpga_hdl.board import build
@@ -22,6 +24,7 @@ from contactfpga_sim.verify.netlist.replay import RUNS, replay, stimulus
 ICEBREAKER, ULX3S = BOARDS["icebreaker"], BOARDS["ulx3s-12f"]
 SMALL = ULX3S.skin.replace(rows=3, columns=3, report="cells", settle_us=20.0, clock_hz=50_000_000)
 """With its clock from the PLL."""
+LEVELS = Skin(rows=3, columns=4, report="cells", guard=True, ruler=64, harder=(16, 4), precharge_us=1.0, settle_us=30.0)
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +53,18 @@ def test_one_wrong_table_in_the_netlist_is_seen(synthesized):
         replay(SMALL, model_of(SMALL, broken), stimulus(SMALL, 50, []))
 
 
+@pytest.mark.campaign
+@pytest.mark.skipif(shutil.which("icebox_vlog") is None, reason="icebox_vlog is not installed")
+def test_the_soft_kits_bitstream_reads_levels_as_the_golden_model_says(tmp_path, record_property):
+    skin = kits.kit("soft").skin
+    out = replay(skin, model_of(skin, extract.from_bitstream(ICEBREAKER, skin, tmp_path)), stimulus(skin, 40, []))
+    assert out.packets > 40
+    record_property("cases", out.frames)
+
+
 @pytest.mark.slow
-def test_the_gateware_itself_passes_with_no_reset_before_cycle_0():
-    skin = Skin()
+@pytest.mark.parametrize("skin", [Skin(), LEVELS], ids=["zones", "levels"])
+def test_the_gateware_itself_passes_with_no_reset_before_cycle_0(skin):
     assert bitstream_replay.reset_clocks(skin, model_of(skin)) == 0
     assert replay(skin, model_of(skin), stimulus(skin, 3 * bitstream_replay.BATCH // 2, [])).packets > 200
 

@@ -20,6 +20,8 @@ from contactfpga.skin import Skin
 from contactfpga_sim.model.sheet import agreement
 
 SIZE, ROW = 8, 4
+LEVELS_N = 0.13, 0.53, 1.74
+"""Of the soft kit (docs/soft.md)."""
 STATED = Circuit(falling=Falling(), column_pull_ohm=1e8, diode=SILICON, series_ohm=33.0)
 
 
@@ -31,22 +33,30 @@ def extracted() -> Circuit:
 @pytest.mark.slow
 @pytest.mark.skipif(not agreement.installed(), reason="ngspice is not installed")
 @pytest.mark.parametrize(("celsius", "supply_v"), [(-20.0, 3.0), (27.0, 3.3), (70.0, 3.6)])
-def test_the_soft_kit_reads_its_level_at_the_corners_in_ngspice(celsius, supply_v):
+@pytest.mark.parametrize("level", range(3))
+def test_the_soft_kit_reads_its_levels_at_the_corners_in_ngspice(level, celsius, supply_v):
     """On its own lines, the ruler's multiple lies between the times of cells 0.3 octaves from the level's resistance,
-    at a threshold that follows the supply."""
+    pressed harder alone or in a whole row, and lighter alone, at a threshold that follows the
+    supply."""
     kit, cell = kits.kit("soft"), load_cover(kits.kit("soft").skin_path).cell
+    level_ohm = float(cell.ohm(np.array(LEVELS_N[level])))
     circuit = extract.extracted(kit.layout).circuit.replace(supply_v=supply_v)
     lines, at_v = (kit.skin.row_lines, kit.skin.columns), circuit.falling.threshold_v * supply_v / 3.3
     fallen_s = []
-    for ohm in (circuit.falling.ruler_ohm, cell.level_ohm / 2**0.3, cell.level_ohm * 2**0.3):
+    for together, ohm in (
+        (True, circuit.falling.ruler_ohm),
+        (False, level_ohm / 2**0.3),
+        (True, level_ohm / 2**0.3),
+        (False, level_ohm * 2**0.3),
+    ):
         cells, row = np.full(lines, np.inf), lines[0] // 2
-        cells[row] = ohm if not fallen_s else np.inf  # the ruler's columns fall together
+        cells[row] = ohm if together else np.inf  # the ruler's columns fall together
         cells[row, 3] = ohm
         phase = phases.settle(Network(circuit, np.isfinite(cells), ohm=cells), Levels.of(circuit))
         seconds, volts = agreement.run(phase, 60e-6, 6000, celsius)
         fallen_s.append(float(np.interp(-at_v, -volts[:, 3], seconds)))
-    ruler_s, harder_s, lighter_s = fallen_s
-    assert harder_s < ruler_s * kit.skin.ruler / falling.SIXTEENTHS < lighter_s
+    ruler_s, *harder_s, lighter_s = fallen_s
+    assert max(harder_s) < ruler_s * kit.skin.derived.rulers[level] / falling.SIXTEENTHS < lighter_s
 
 
 PATTERNS = {

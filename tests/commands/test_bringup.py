@@ -336,7 +336,7 @@ def test_the_skin_of_a_bring_up_is_the_kits_with_cells(name, tmp_path, run):
     assert f"contactfpga build {kit.board.name} --skin {path}" in said
     skin, usual = Skin.load(path), kit.skin
     later = bringup.LATER if usual.ruler else 1
-    assert skin == usual.replace(report="cells", send="always", settle_us=later * usual.settle_us)
+    assert skin == usual.replace(report="cells", send="always", harder=(), settle_us=later * usual.settle_us)
     assert load_circuit(path) == load_circuit(kit.skin_path)
     assert run("build", kit.board.name, "--skin", path, "--wiring")[0] == 0
 

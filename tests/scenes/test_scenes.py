@@ -41,7 +41,7 @@ def test_every_scene_fits_every_sheet(name, sheet):
     assert cells.any() == (name != "nothing") or sheet == (1, 1)
 
 
-COUNTS = {"fingertip": 1, "two_fingers": 2, "palm": 1, "edge": 1, "moving": 1, "nothing": 0}
+COUNTS = {"fingertip": 1, "two_fingers": 2, "palm": 1, "palm_and_fingers": 3, "edge": 1, "moving": 1, "nothing": 0}
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())

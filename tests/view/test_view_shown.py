@@ -1,6 +1,7 @@
 """What the view shows of a sheet and its contacts, without a browser: cameras that fit, words, rulers, foam, light, the
 chart."""
 
+import dataclasses
 import json
 import math
 import re
@@ -115,7 +116,7 @@ class Cells(HTMLParser):
 
 
 def test_the_table_has_all_that_is_known_of_each_contact():
-    """Also forces, where one is known."""
+    """Also forces, where one is known, and mean levels of a sheet that has several."""
     before, now = (frame(time_us, [(4, 6, 9), (12, 6, 4)]) for time_us in (0, 300_000))
     head = ["", "x, y in mm", "mm²", "age, s"]
     one, two = ["#1", "40.0, 60.0", "900", "0.3"], ["#2", "120.0, 60.0", "400", "0.3"]
@@ -123,13 +124,16 @@ def test_the_table_has_all_that_is_known_of_each_contact():
     felt = contacts.rows(moment([before, now], pushes=[(next(iter(now)), 3.25)]))
     assert Cells(contacts.table(plain)).texts == [*head, *one, *two]
     assert Cells(contacts.table(felt)).texts == [*head, "N", *one, "3.2", *two, ""]
+    leveled = [dataclasses.replace(row, pressure=level) for row, level in zip(plain, (1.25, 3.0), strict=True)]
+    assert Cells(contacts.table(leveled)).texts == [*head, "level", *one, "1.2", *two, "3.0"]
+    assert leveled[1].lines[1].endswith("   level 3.0")
     assert "Nothing touches" in contacts.table([])
     assert ">1 contact<" in contacts.table(plain[:1])
 
 
 def test_a_zone_all_round_a_limb_is_in_the_table_without_an_id():
     ring = moments(0, [(16, 120, 16 * 4)], skin=AROUND, before=None)
-    zone = SimpleNamespace(x_mm=None, y_mm=40.0, area_mm2=2827.0, area_cells=16)
+    zone = SimpleNamespace(x_mm=None, y_mm=40.0, area_mm2=2827.0, area_cells=16, pressure=None)
     tracks = SimpleNamespace(active=(), unsure=(zone,), time_us=0)
     (row,) = contacts.rows(Moment(ring, tracks))
     assert Cells(contacts.table([row])).texts[4:] == ["", "all round, 40.0", "2,827", ""]

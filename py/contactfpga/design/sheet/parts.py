@@ -237,10 +237,12 @@ CAPACITOR = Part(
 )
 
 
-def column_capacitor(pf: float) -> Part:
-    """A capacitor whose value heat does not move; only that of 220 pF has a number."""
-    article = ("Yageo", "CC0603JRNPO9BN221") if pf == 220 else ("", "")
-    return dataclasses.replace(CAPACITOR, order="capacitor, 0603, C0G (NP0), 5 %, 50 V", article=article)
+def column_capacitor(pf: float, tolerance: float) -> Part:
+    """A capacitor whose value heat does not move; of 220 pF, those of 5 and 2 % have a number."""
+    articles = {0.05: ("Yageo", "CC0603JRNPO9BN221"), 0.02: ("Murata", "GRM1885C1H221GA01D")}
+    article = articles.get(tolerance, ("", "")) if pf == 220 else ("", "")
+    order = f"capacitor, 0603, C0G (NP0), {100 * tolerance:g} %, 50 V"
+    return dataclasses.replace(CAPACITOR, order=order, article=article)
 
 
 FIDUCIAL = Part(
@@ -264,6 +266,10 @@ def _soic16(name: str) -> Part:
 
 
 HC595 = _soic16("74HC595")
+LVC595 = dataclasses.replace(_soic16("74LVC595A"), article=("Nexperia", "74LVC595AD"))
+"""With the pins of the 74HC595, for 1.2 to 3.6 V."""
+LVC_OHM = 25.0
+"""Resistance of its outputs, rounded up: at most 0.55 V at 24 mA and 3 V, the usual limit of the family."""
 HC165 = _soic16("74HC165")
 
 HEADER_PINS = 10, 14, 16, 20, 26, 34, 40

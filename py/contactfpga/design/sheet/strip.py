@@ -21,6 +21,8 @@ from contactfpga.design.sheet.parts import (
     HC165,
     HC595,
     HEADER_PINS,
+    LVC595,
+    LVC_OHM,
     RESISTOR,
     Part,
     column_capacitor,
@@ -91,7 +93,7 @@ def draw(
     below = [pin for line in lines for pin in _line(drawing, circuit, line, base, grid)]
     bottom = base - 4.6
     middle = (min(line.x for line in lines) + max(line.x for line in lines)) / 2
-    chips = _chips(skin, middle, grid)
+    chips = _chips(skin, circuit, middle, grid)
     plugs = _connectors(_for_pmods(skin, board) or _of_lines(skin), middle, grid, below=bool(chips))
     ends = [pin.x - VIA_MM / 2 for pin in below] + [max(line.x for line in lines) + _PAD]
     if chips:
@@ -119,7 +121,8 @@ def _line(drawing: Drawing, circuit: Circuit, line: Line, base: float, grid: Gri
         ohms = f"{circuit.row_pull_ohm if line.kind == 'row' else circuit.column_pull_ohm:g}"
         beside = "R", RESISTOR, ohms, SUPPLY if line.pull == "up" else GND
     elif circuit.falling and line.kind == "column":
-        beside = "C", column_capacitor(circuit.falling.column_pf), f"{circuit.falling.column_pf:g}p", GND
+        falling = circuit.falling
+        beside = "C", column_capacitor(falling.column_pf, falling.tolerance), f"{falling.column_pf:g}p", GND
     if beside:
         letter, part, value, rail = beside
         x -= _BESIDE
@@ -209,8 +212,8 @@ CHIP_STEPS = 15
 """Grid steps from chip to chip; its capacitor is at step 9."""
 
 
-def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
-    nets = list(_chip_nets(skin))
+def _chips(skin: Skin, circuit: Circuit, middle: float, grid: Grid) -> list[_Unit]:
+    nets = list(_chip_nets(skin, LVC595 if circuit.pin_ohm <= LVC_OHM else HC595))
     if not nets:
         return []
     start = grid.near(middle - len(nets) * CHIP_STEPS * GRID_MM / 2, below=False)
@@ -225,7 +228,7 @@ def _chips(skin: Skin, middle: float, grid: Grid) -> list[_Unit]:
     return units
 
 
-def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
+def _chip_nets(skin: Skin, register: Part) -> Iterator[tuple[Part, dict[str, str]]]:
     numbers: dict[str, int] = {}
     chips: dict[tuple[str, int, int], dict[str, str]] = {}
     for output in wiring.outputs(skin):
@@ -240,7 +243,7 @@ def _chip_nets(skin: Skin) -> Iterator[tuple[Part, dict[str, str]]]:
             before = data if number == 0 else f"row_{chain}_{number}"
             after = {"9": f"row_{chain}_{number + 1}"} if more else {}
             shared = {"8": GND, "10": SUPPLY, "11": "row_clock", "12": "row_latch", "13": "row_enable_n", "16": SUPPLY}
-            yield HC595, pins | shared | {"14": before} | after
+            yield register, pins | shared | {"14": before} | after
         else:
             data = port("column_data", chain, skin.column_chains)
             before = data if number == 0 else f"column_{chain}_{number}"

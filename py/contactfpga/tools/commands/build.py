@@ -16,6 +16,7 @@ from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.boards.wiring import Connection, Output, Wire, ohms
 from contactfpga.design import buildable
 from contactfpga.design.circuit import Circuit, CircuitError, check_times, load_checked, load_circuit
+from contactfpga.design.sheet.parts import LVC595, LVC_OHM
 from contactfpga.errors import UNSOLVED, ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
@@ -166,6 +167,14 @@ class WiringTable:
         for sheet, skin in self._sheets:
             counted = ", ".join(f"{count} {name}" for name, count in wiring.parts(skin).items())
             terminal.say(f"{sheet and f'sheet {sheet}: '}{counted}", hang=2)
+        if (
+            self.circuit
+            and self.circuit.pin_ohm <= LVC_OHM
+            and any(one.chip == "74HC595" for _, one in self._outputs())
+        ):
+            terminal.say(
+                f"Each 74HC595 is a {LVC595.order.partition(',')[0]}, with the same pins: pin_ohm asks for it."
+            )
         if self.circuit is None:
             terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)

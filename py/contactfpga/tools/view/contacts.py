@@ -27,6 +27,7 @@ class Row:
     age_s: float | None
     force_n: float | None = None
     link: str = ""
+    pressure: float | None = None
 
     @property
     def place(self) -> str:
@@ -43,6 +44,7 @@ class Row:
         parts = [f"{self.area_mm2:,.0f} mm²"]
         parts += [] if self.age_s is None else [f"{self.age_s:.1f} s"]
         parts += [] if self.force_n is None else [f"{self.force_n:.1f} N"]
+        parts += [] if self.pressure is None else [f"level {self.pressure:.1f}"]
         return f"{self.name}   {self.place} mm".strip(), "   ".join(parts)
 
 
@@ -57,7 +59,7 @@ def _row(zone: Zone, link: str, track: Track | None = None, moment: Moment | Non
     if track is not None and moment is not None:
         number, age_s = track.id, max(0.0, (moment.tracks.time_us - track.since_us) / 1e6)
         force_n = force_at(zone, moment.pushes)
-    return Row(number, zone.x_mm, zone.y_mm, zone.area_mm2, zone.area_cells, age_s, force_n, link)
+    return Row(number, zone.x_mm, zone.y_mm, zone.area_mm2, zone.area_cells, age_s, force_n, link, zone.pressure)
 
 
 def force_at(zone: Zone, pushes: Sequence[tuple[Zone, float | None]]) -> float | None:
@@ -77,17 +79,17 @@ def table(found: Sequence[Row], no_data: bool = False) -> str:
     head = "Nothing touches" if not count else f"{count} contact{'' if count == 1 else 's'}"
     if not count:
         return _framed(head, "")
-    forced = any(row.force_n is not None for row in found)
-    names = ["", "x, y in mm", "mm²", "age, s", *(["N"] if forced else [])]
-    lines = [_line("th", names)]
-    body = [_line("td", _cells(row, forced)) for row in found]
-    return _framed(head, f'<table class="contacts"><thead>{lines[0]}</thead><tbody>{"".join(body)}</tbody></table>')
+    columns = {"": [row.name for row in found], "x, y in mm": [row.place for row in found]}
+    columns |= {"mm²": [f"{row.area_mm2:,.0f}" for row in found], "age, s": _tenths([row.age_s for row in found])}
+    for name, values in (("N", [row.force_n for row in found]), ("level", [row.pressure for row in found])):
+        if any(value is not None for value in values):
+            columns[name] = _tenths(values)
+    body = "".join(_line("td", texts) for texts in zip(*columns.values(), strict=True))
+    return _framed(head, f'<table class="contacts"><thead>{_line("th", columns)}</thead><tbody>{body}</tbody></table>')
 
 
-def _cells(row: Row, forced: bool) -> list[str]:
-    age = "" if row.age_s is None else f"{row.age_s:.1f}"
-    force = "" if row.force_n is None else f"{row.force_n:.1f}"
-    return [row.name, row.place, f"{row.area_mm2:,.0f}", age, *([force] if forced else [])]
+def _tenths(values: Iterable[float | None]) -> list[str]:
+    return ["" if value is None else f"{value:.1f}" for value in values]
 
 
 def _line(tag: str, texts: Iterable[str]) -> str:

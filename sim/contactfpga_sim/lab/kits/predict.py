@@ -20,7 +20,6 @@ import numpy as np
 
 from contactfpga.design import kits, predictions
 from contactfpga.design.circuit import Circuit, falling, needed_by
-from contactfpga.design.circuit.falling import Corner
 from contactfpga.design.cover import load_cover
 from contactfpga.design.cover.cells import Cells
 from contactfpga.design.cover.felt import BODY, LENGTH_M, WIDTH_M, Force, Sheet, Touch, feel, spread_evenly
@@ -35,6 +34,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import MixedTimes
 from contactfpga_sim.apps.latency.usb import BridgeSettings, delivered
+from contactfpga_sim.lab.kits.film import LevelReader
 from contactfpga_sim.model.board.compiled import CompiledBoard
 
 DRAWS = 200
@@ -112,6 +112,8 @@ FALLING = {
     "threshold_v": Tolerance("the pins' threshold", 1.1 / 1.4, 1.7 / 1.4, "between VIL and VIH"),
     "ruler_ohm": Tolerance("resistors of the ruler", 0.99, 1.01, "1 % parts"),
 }
+TRIED_OHM = 3e3, 1.5e5
+"""Range of the resistors that are tried in the cells' places."""
 TILT = (COVER["tilt"].high - COVER["tilt"].low) / math.sqrt(12)
 """Standard deviation of the factor that each cap has of its own."""
 
@@ -252,14 +254,18 @@ def _falling(kit: Kit, drawn: list[Circuit], rng: np.random.Generator) -> Iterat
     here = f"python -m contactfpga_sim.lab.kits.predict {kit.name}"
     ruler_us = [1e6 * falling.ruler_s(one, *lines) for one in drawn]
     yield _made("ruler_us", "a guard row selected until the columns fall", ruler_us, "circuit", here)
-    later = skin.ruler / falling.SIXTEENTHS
-    yield _made("sample_us", "a row selected until it is sampled", [later * one for one in ruler_us], "circuit", here)
-    found = []
-    for number, (one, us) in enumerate(zip(drawn, ruler_us, strict=True)):
-        leak_a = 1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (number > 0)
-        found.append(float(falling.read_ohm(one, lines[0], 1e-6 * later * us, Corner(leak_a=leak_a))))
-    what = "the largest resistor in a cell's place that reads pressed, alone"
-    yield _made("level_ohm", what, found, "circuit", here)
+    reader = LevelReader(skin)
+    tried = np.geomspace(*TRIED_OHM, skin.rows * skin.columns).reshape(skin.rows, skin.columns)
+    # the first circuit is the nominal one
+    leaks_a = [1e-6 * falling.parts(one).leak_ua * rng.uniform(-1, 1) * (one is not drawn[0]) for one in drawn]
+    maps = [reader.read(tried, one, leak_a) for one, leak_a in zip(drawn, leaks_a, strict=True)]
+    for level, sixteenths in enumerate(skin.derived.rulers, 1):
+        name, of = (f"_{level}", f" for level {level}") if level > 1 else ("", "")
+        us = [sixteenths / falling.SIXTEENTHS * one for one in ruler_us]
+        yield _made(f"sample{name}_us", f"a row selected until it is sampled{of}", us, "circuit", here)
+        found = [float(tried[one >= level].max()) for one in maps]
+        what = f"the largest resistor in a cell's place that the board reads at level {level}, alone"
+        yield _made(f"level{name}_ohm", what, found, "gateware", here)
 
 
 class Pressing(NamedTuple):

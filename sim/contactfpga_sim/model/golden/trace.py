@@ -87,6 +87,25 @@ class Timeline:
         pieces = list(zip(starts, held, lines, strict=True))
         return cls(pieces, received)
 
+    @classmethod
+    def falling(cls, skin: Skin, frames: Iterable[np.ndarray], received: Sequence[tuple[int, bytes]] = ()) -> Timeline:
+        """Frames of (row lines, columns) clocks, a guard row last, from selecting a row until its columns read
+        pressed; what takes longer than the row does not. Each is held for one scan from power-up."""
+        known = facts(skin)
+        order = [*range(known.rows, known.row_lines), *range(known.rows)]
+        pieces, cuts = {}, {0: Cuts()}
+        for frame, clocks in enumerate(frames):
+            for slot, row in enumerate(order, frame * known.row_lines):
+                start = known.row_shift + slot * known.row_clocks
+                fall = np.minimum(clocks[row], known.row_clocks)
+                for clock in {-1, *fall[fall < known.row_clocks].tolist()}:
+                    at = max(0, start + clock)
+                    pieces[at] = np.tile(fall <= clock, (known.rows, 1))
+                    if row == known.rows:
+                        cuts[at] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), row))
+        held = [(at, pieces[at], None) for at in sorted(pieces)]
+        return cls(held, received, [(at, cuts[at]) for at in sorted(cuts)])
+
     def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Cells and stuck columns in ``cycle``; None: none pressed."""
         index = bisect.bisect_right(self._starts, cycle) - 1  # type: ignore[attr-defined]

@@ -13,7 +13,7 @@ from rich.text import Text
 from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
-from contactfpga.zones.zone import Zones
+from contactfpga.zones.zone import Zones, cell_labels
 from contactfpga_sim.model.golden.zones import closed_flood, flood
 
 COLORS = style.PALETTE[:6]
@@ -41,8 +41,7 @@ def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
 
 
 def _sheet(out: Drawn, unicode: bool) -> Text:
-    labels = _labels(out)
-    count = out.frame.zones if out.frame else 0
+    labels, count = _labels(out), zones(out)
     text = Text(f"{out.scene}: {count} zone{'' if count == 1 else 's'}\n")
     for pieces in _halves(labels) if unicode else _ascii(labels):
         for character, look in pieces:
@@ -51,7 +50,16 @@ def _sheet(out: Drawn, unicode: bool) -> Text:
     return text
 
 
+def zones(out: Drawn) -> int:
+    """Number of zones that the frame states; of one with levels, of the contacts found in its map."""
+    if out.frame is None or out.frame.levels is None:
+        return out.frame.zones if out.frame else 0
+    return int(_labels(out).max())
+
+
 def _labels(out: Drawn) -> np.ndarray:
+    if out.frame is not None and out.frame.levels is not None:
+        return cell_labels(out.frame, out.skin.sheet)
     find = closed_flood if out.skin.closed else flood
     return find(out.cells, out.skin.connectivity)[0]
 
@@ -104,8 +112,8 @@ def _save(outcomes: Sequence[Drawn], path: Path) -> None:
         shown = np.where(labels > 0, (labels - 1) % len(COLORS) + 1, 0)
         panel.imshow(palette[shown], extent=_extent(out.skin), interpolation="nearest")
         if out.frame is not None:
-            zones = Zones(out.frame, out.skin.sheet).array
-            panel.plot(zones["x_mm"], zones["y_mm"], "k+", markersize=7, markeredgewidth=1.4)
+            array = Zones(out.frame, out.skin.sheet).array
+            panel.plot(array["x_mm"], array["y_mm"], "k+", markersize=7, markeredgewidth=1.4)
         panel.set_title(out.scene, fontsize=style.SMALL)
     figure.suptitle("Contact zones and their barycenters (+), as they came over the wire", fontsize=style.LARGE)
     path.parent.mkdir(parents=True, exist_ok=True)

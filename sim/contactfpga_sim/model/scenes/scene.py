@@ -151,6 +151,18 @@ def palm(skin: Skin) -> Scene:
     return Scene((Contact(shape=contacts.palm(), x_mm=width / 2, y_mm=height / 2 - 8, force_n=40.0),))
 
 
+def palm_and_fingers(skin: Skin) -> Scene:
+    """The flat of a hand below two fingertips, of which the left one presses twice as hard; as large as fits."""
+    width, height = _extent(skin)
+    scale = min(1.0, max(0.1, min(width, height) / 160))
+    x, y, hand = width / 2, height / 2, contacts.palm(scale)
+    found = [Contact(shape=hand, body="palm", x_mm=x, y_mm=y + 20 * scale, force_n=60 * scale**2)]
+    for side, force in ((-1, 20.0), (1, 10.0)):
+        tip, at_mm = contacts.disc(FINGER_MM * scale), x + side * 35 * scale
+        found.append(Contact(shape=tip, x_mm=at_mm, y_mm=y - 60 * scale, force_n=force * scale**2))
+    return Scene(tuple(found))
+
+
 def sole(skin: Skin) -> Scene:
     """A bare foot in the middle, along the longer side, as long as fits."""
     width, height = _extent(skin)
@@ -206,7 +218,8 @@ def grip(skin: Skin) -> Scene:
 
 
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
-    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
+    scene.__name__: scene
+    for scene in (fingertip, two_fingers, palm, palm_and_fingers, sole, edge, moving, pushing, nothing)
 }
 
 AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}

@@ -18,6 +18,8 @@ import numpy as np
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
+from contactfpga.design import kits
+from contactfpga.design.circuit.falling import SIXTEENTHS
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga.tools.console import interrupt, numbers
@@ -52,10 +54,11 @@ RUNS: tuple[tuple[str, Skin], ...] = (
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, clock_hz=30_000_000, baud=3_000_000)),
     ("icebreaker", _REVERSAL.replace(rows=8, columns=8, guard=True, clock_hz=24_000_000, baud=12_000_000)),
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, self_test=True, clock_hz=30_000_000, baud=3_000_000)),
+    ("icebreaker", kits.kit("soft").skin),
 )
 """Default boards and sheets. The first sends every frame, the others overwrite some. The second has rows on shift
-registers, the fourth its clock from the PLL, the last four bidirectional pins, the third of these guard lines, the last
-a self-test."""
+registers, the fourth its clock from the PLL, the next four bidirectional pins, the third of these guard lines, the
+fourth a self-test. The last has a ruler and levels."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,13 +91,23 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
     derived = skin.derived
     scan = derived.frame_clocks
     cycles = len(frames) * scan + 2 * derived.max_frame_bytes * 10 * derived.bit_clocks
-    timeline = Timeline.frames(
-        skin, frames, received=requests(range(scan // 2, cycles, 37 * scan + 5), derived.bit_clocks)
-    )
+    received = requests(range(scan // 2, cycles, 37 * scan + 5), derived.bit_clocks)
+    timeline = _falling(skin, frames, received) if skin.ruler else Timeline.frames(skin, frames, received=received)
     expected = predict(skin, timeline, cycles)
     got = bench_native.run(skin, _after(timeline, reset), cycles + reset, model)
     changes = compare(expected.at_the_pins(), got.at_the_pins().since(reset))
     return NetlistReplay(len(frames), sum(value == 0 for _, value in expected.bytes), cycles, changes)
+
+
+def _falling(skin: Skin, frames: np.ndarray, received: Sequence[tuple[int, bytes]]) -> Timeline:
+    """Pressed cells fall at any clock of their row, others not; the ruler some clocks later or sooner in each frame."""
+    rng, known = np.random.default_rng(len(frames)), skin.derived
+    shape = (len(frames), skin.row_lines, skin.columns)
+    clocks = rng.integers(1, known.settle_clocks, shape)
+    clocks[:, : skin.rows][~frames] = known.row_clocks
+    usual = known.settle_clocks * SIXTEENTHS // max(skin.ruler, SIXTEENTHS)
+    clocks[:, skin.rows :] = rng.integers(usual // 2, usual + 1, (len(frames), 1, 1))
+    return Timeline.falling(skin, clocks, received)
 
 
 def reset_clocks(skin: Skin, model: native.Model) -> int:
@@ -110,7 +123,8 @@ def reset_clocks(skin: Skin, model: native.Model) -> int:
 
 def _after(timeline: Timeline, cycles: int) -> Timeline:
     pieces = [(start + cycles, cells, stuck) for start, cells, stuck in timeline.pieces]
-    return Timeline(pieces, [(start + cycles, data) for start, data in timeline.received])
+    received = [(start + cycles, data) for start, data in timeline.received]
+    return Timeline(pieces, received, [(start + cycles, cuts) for start, cuts in timeline.cuts])
 
 
 # ---- frames

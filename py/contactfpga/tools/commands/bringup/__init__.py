@@ -97,9 +97,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def bring_up_skin(kit: Kit) -> Skin:
-    """The kit's Skin with all cells in each frame, and without debounce; with a ruler it waits for lighter cells."""
+    """The kit's Skin with all cells in each frame, and without debounce; with a ruler it has one level, and waits for
+    lighter cells."""
     settle_us = kit.skin.settle_us * (LATER if kit.skin.ruler else 1)
-    return kit.skin.replace(report="cells", debounce="none", send="always", settle_us=settle_us)
+    return kit.skin.replace(report="cells", debounce="none", send="always", harder=(), settle_us=settle_us)
 
 
 def _write_skin(kit: Kit, skin: Skin, name: str) -> int:
