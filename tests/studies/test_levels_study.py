@@ -9,9 +9,9 @@ import pytest
 
 from contactfpga.design.cover import BODIES, Cover
 from contactfpga_sim.apps.covers import FOAM_M, sheet
+from contactfpga_sim.apps.light import Reading, Sensed
 from contactfpga_sim.apps.score import MODELS, Interval, Score
 from contactfpga_sim.lab.benchmark import entries, scenes
-from contactfpga_sim.lab.benchmark.entries import Reading, Sensed
 from contactfpga_sim.lab.benchmark.pressed import FOAM_MM, Contact, flesh, pressed, tiles
 from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.cover.elements import touching

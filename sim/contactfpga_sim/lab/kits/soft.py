@@ -18,9 +18,9 @@ from contactfpga.design.cover.cells import cells_of
 from contactfpga.design.kits import Kit
 from contactfpga.design.sheet.extract import extracted
 from contactfpga_sim.apps import errors, pool, result_cache
+from contactfpga_sim.apps.light import OLDER, TOUCHED, Reading, Sensed
 from contactfpga_sim.apps.score import Interval, interval
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.benchmark.entries import OLDER, TOUCHED, Reading, Sensed
 from contactfpga_sim.lab.benchmark.pressed import Pressed
 from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.kits import predict

@@ -87,7 +87,7 @@ _BUGS = (
     Bug("the lightest level counts twice", Scanner, "pressed", lambda pressed, inside: pressed + inside["read"][0]),
     Bug("a level is that of the row before", Scanner, "level_kept_2",
         lambda kept, inside: Mux(inside["clock"] == 0, inside["level_now_2"], inside["level_kept_2"])),
-    Bug("a sample's clock moves within the row", Scanner, "sample_clock1", 
+    Bug("a sample's clock moves within the row", Scanner, "sample_clock1",
         lambda clock, inside: clock ^ inside["moves"]),
 )  # fmt: skip
 CASES = (ProofCase("a row's samples are its levels", "1x1, three levels", levels, 2, _BUGS, 60),)
