@@ -43,7 +43,7 @@ def add_flags(flag: flags.Flags) -> None:
     flag("SCENES ...", what)
     _goal_flags(flag.group("what the Skin must meet for each of SCENES; none means no limit"))
     _candidate_flags(flag.group("what is tried"))
-    usual = "Scenes that check the answer; up to 16 times as many choose it (default: the file's, or 500)."
+    usual = "Scenes that check the answer; up to 8 times as many choose it (default: the file's, or 500)."
     flag("--placements N", usual, numbers.whole(2, 1_000_000))
     flag("--threshold X", "Count cells of recordings above this as pressed; needed for numbers.", numbers.CELL)
     flag("--seed N", "Seed of the places (default: the file's, or 0).", numbers.SEED)

@@ -30,11 +30,13 @@ Values = dict[str, list[float]]
 """Value per scene or fingertip touch, by metric."""
 
 
-def values_of(task: FitTask, source: Source, tried: Sequence[Candidate], numbers: Sequence[int]) -> list[Values]:
-    """Errors by metric of each candidate's zones on these scenes. All are on one sheet, whose cells take the same
-    forces."""
+def values_of(
+    task: FitTask, source: Source, tried: Sequence[Candidate], numbers: Sequence[int], feel: bool
+) -> list[Values]:
+    """Errors by metric of each candidate's zones on these scenes and, to ``feel``, on fingertips. All are on one sheet,
+    whose cells take the same forces."""
     skins, covers = zip(*((one.skin, one.cover) for one in tried))
-    force_n = task.goals.felt_n if task.goals.unfelt is not None and faces.feels(covers[0]) else None
+    force_n = task.goals.felt_n if feel and task.goals.unfelt is not None and faces.feels(covers[0]) else None
     key = _key(task, source, skins, covers, numbers, force_n)
     found: list[Values] = result_cache.cached(
         "fit-errors", key, lambda: _values(task, source, skins, covers, numbers, force_n)
@@ -55,30 +57,34 @@ def _values(
     pitch = (skins[0].pitch_x_mm, skins[0].pitch_y_mm)
     touches = faces.touches(pressing, pitch, force_n, numbers) if pressing and force_n is not None else None
     seen: dict[object, Values] = {}
-    felt: dict[Cover | None, Values] = {}
+    tips: dict[Cover | None, Values] = {}
     found = []
     for skin, cover in zip(skins, covers, strict=True):
         sees = (cover, skin.levels, skin.connectivity if exact(skin) else skin.replace(scan="raster", baud=Skin().baud))
         if sees not in seen:
             seen[sees] = _compared(looks, skin, cover)
-        if cover not in felt:
-            felt[cover] = {"unfelt": faces.unfelt(cover, pitch, touches)} if cover and touches is not None else {}
-        found.append(seen[sees] | felt[cover])
+        if cover not in tips:
+            tips[cover] = {"unfelt": faces.unfelt(cover, pitch, touches)} if cover and touches is not None else {}
+        found.append(seen[sees] | tips[cover])
     return found
 
 
 def decided(goals: Goals, values: Values, looks: int) -> bool | None:
     """Whether all limits are met; None: more scenes are needed. Each side errs with at most :data:`ERR`, shared by all
     looks."""
-    met = True
-    for name, limit in goals.limits():
-        if name not in values:
-            continue
-        low, high = stats.bounds(values[name], ERR / looks, name in SHARES)
-        if low > limit:
-            return False
-        met &= high <= limit
-    return True if met else None
+    verdicts = [_met(goals, values, looks, name) for name, _ in goals.limits() if name in values]
+    return False if False in verdicts else None if None in verdicts else True
+
+
+def felt(goals: Goals, values: Values, looks: int) -> bool:
+    """Whether fingertips have decided; then they need no more draws."""
+    return goals.unfelt is not None and "unfelt" in values and _met(goals, values, looks, "unfelt") is not None
+
+
+def _met(goals: Goals, values: Values, looks: int, name: str) -> bool | None:
+    limit = getattr(goals, name)
+    low, high = stats.bounds(values[name], ERR / looks, name in SHARES)
+    return False if low > limit else True if high <= limit else None
 
 
 def _compared(looks: Sequence[Look], skin: Skin, cover: Cover | None) -> Values:

@@ -12,7 +12,7 @@ from contactfpga_sim.apps import stats
 from contactfpga_sim.apps.fit import cost
 from contactfpga_sim.apps.fit.candidates import SHEET, Candidate
 from contactfpga_sim.apps.fit.faces import pressing
-from contactfpga_sim.apps.fit.measuring import FIRST, Values, decided, speed_of, values_of
+from contactfpga_sim.apps.fit.measuring import FIRST, Values, decided, felt, speed_of, values_of
 from contactfpga_sim.apps.fit.sources import RecordingSource, Source
 from contactfpga_sim.apps.fit.trial import Fit, FitTask, Measurement, SoFar, Step, Trial, gathered
 from contactfpga_sim.apps.score import interval
@@ -80,7 +80,7 @@ class _Race:
         }
         looks = max(map(len, ends.values()))
         for look in range(looks):
-            self._draw({source: (0, *at)[look : look + 2] for source, at in ends.items() if look < len(at)})
+            self._draw({source: (0, *at)[look : look + 2] for source, at in ends.items() if look < len(at)}, looks)
             passed = []
             for one in self._left.copy():
                 verdicts = [decided(task.goals, self._values[source, one], looks) for source in task.sources]
@@ -100,16 +100,17 @@ class _Race:
                 break
         return best
 
-    def _draw(self, ranges: dict[Source, Sequence[int]]) -> None:
+    def _draw(self, ranges: dict[Source, Sequence[int]], looks: int) -> None:
         """Add the values of the scenes from the first to before the second number of each source."""
         alike: dict[object, list[Candidate]] = {}
         for one in self._left:
             sheet = tuple(value for name, value in one.settings if name in SHEET)
             alike.setdefault((sheet, repr(pressing(one.cover))), []).append(one)
         jobs: dict[Any, tuple[Any, ...]] = {
-            (source, group, numbers.start): (values_of, self._task, source, tuple(alike[group]), numbers)
+            (source, group, numbers.start): (values_of, self._task, source, tuple(tried), numbers, feel)
             for source, ends in ranges.items()
-            for group in alike
+            for group, tried in alike.items()
+            for feel in (not all(felt(self._task.goals, self._values.get((source, one), {}), looks) for one in tried),)
             for numbers in _pieces(*ends)
         }
         found = gathered("scenes", jobs, self._executor, self._step, self._pieces)
@@ -172,7 +173,7 @@ def _reported(
         first = source.most(task.count)
         jobs[source] = (speed_of, task, source, one, _timed(task, source, first), CHECKED * met)
         for numbers in _pieces(first, first + min(task.count, first)):
-            jobs[source, numbers.start] = (values_of, task, source, (one,), numbers)
+            jobs[source, numbers.start] = (values_of, task, source, (one,), numbers, True)
     found = gathered("report", jobs, executor, step)
     measured = []
     for source in task.sources:

@@ -34,7 +34,7 @@ SECONDS = 1.0
 
 COUNT = 500
 
-DRAWS = 16
+DRAWS = 8
 """Most scenes to choose with, as a multiple of those for the report."""
 
 Look = tuple[np.ndarray | Sensed, list[Blob]]
