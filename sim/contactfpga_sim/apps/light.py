@@ -102,5 +102,5 @@ def with_cells(skin: Skin, cover: Cover, levels: int) -> Skin:
     usual = example()[0]
     names = ("guard", "ruler", "precharge_us", "release_us")
     made = skin.replace(**{name: getattr(usual, name) for name in names})
-    settle_us = math.ceil(falling.latest_us(circuit_of(cover), made))
+    settle_us = math.ceil(falling.latest_us(circuit_of(cover), made.row_lines, made.columns, made.ruler))
     return made.replace(settle_us=float(settle_us), harder=usual.harder[: levels - 1])
