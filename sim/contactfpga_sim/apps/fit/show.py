@@ -63,7 +63,7 @@ def _told(fit: Fit) -> list[tuple[Trial, int]]:
     for one in fit.cheaper:
         key: object = (one.skin.rows, one.skin.columns)
         if fit.answer and one.cost[0] == fit.answer.cost[0]:
-            key = one.candidate.cover
+            key = one.candidate.cover if one.candidate.cover != fit.answer.candidate.cover else one.candidate
         groups.setdefault(key, []).append(one)
     told = [(min(group, key=lambda one: (one.excess, one.margin)), len(group)) for group in groups.values()]
     if fit.answer is None:
