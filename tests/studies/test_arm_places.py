@@ -57,7 +57,7 @@ def test_a_lower_threshold_raises_no_touchs_peak(face):
     for threshold in (1.0, 0.4, 0.2):
         case = Geometry(face, 10.0, threshold, 5.0).case()
         (found,) = places._touched(places.Batch(case, Skin(), ((0.8e-3,),), 4, 0))
-        forces.append([force for force, _, _ in found])
+        forces.append([force for force, *_ in found])
     assert all((np.array(lower) <= 1.005 * np.array(higher)).all() for higher, lower in itertools.pairwise(forces))
     assert np.mean(forces[2]) < np.mean(forces[0]) - 0.5
 

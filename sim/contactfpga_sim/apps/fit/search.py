@@ -36,9 +36,10 @@ def fit(
     so_far = {} if so_far is None else so_far
     ordered = sorted(tried, key=lambda one: repr(one.settings))
     possible = sorted((one for one in ordered if one.skin is not None), key=lambda one: one.cost)
-    answer = None
+    answer, pieces = None, 0
     for _, alike in itertools.groupby(possible, key=lambda one: one.wires):
-        answer = _Race(task, list(alike), executor, step, so_far).answer()
+        race = _Race(task, list(alike), executor, step, so_far, pieces)
+        answer, pieces = race.answer(), race.pieces
         if answer:
             break
     refused = [one for one in so_far.values() if one.refusals and (not answer or one.cost < answer.cost)]
@@ -54,11 +55,14 @@ class _Race:
     """Candidates with as many wires, which all get more scenes until each is refused, or is no cheaper than one that
     meets all limits."""
 
-    def __init__(self, task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar):
+    def __init__(
+        self, task: FitTask, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar, pieces: int
+    ):
         self._task, self._executor, self._step, self._so_far = task, executor, step, so_far
         self._left = [one for one in tried if not self._late(one)]
         self._values: dict[tuple[Source, Candidate], Values] = {}
-        self._pieces = 0
+        self.pieces = pieces
+        """Pieces of work so far."""
 
     def _late(self, one: Candidate) -> bool:
         """Whether a scan alone is too long for a touch just after its row was read."""
@@ -113,8 +117,8 @@ class _Race:
             for feel in (not all(felt(self._task.goals, self._values.get((source, one), {}), looks) for one in tried),)
             for numbers in _pieces(*ends)
         }
-        found = gathered("scenes", jobs, self._executor, self._step, self._pieces)
-        self._pieces += len(jobs)
+        found = gathered("scenes", jobs, self._executor, self._step, self.pieces)
+        self.pieces += len(jobs)
         for source, group, start in jobs:
             for one, values in zip(alike[group], found[source, group, start], strict=True):
                 for metric, more in values.items():
