@@ -168,7 +168,7 @@ def _methods(names: list[str] | None, bitmaps: bool) -> list[dict[str, Any]]:
 
     if not names:
         return [ON_HOST] * bitmaps + [*METHODS]
-    maps = {"cells": [ON_HOST], "levels": [LEVELS]}
+    maps: dict[str, list[dict[str, Any]]] = {"cells": [ON_HOST], "levels": [LEVELS]}
     return [method for name in dict.fromkeys(names) for method in maps.get(name) or by(labellers.find(name))]
 
 

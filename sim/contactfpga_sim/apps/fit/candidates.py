@@ -23,9 +23,9 @@ def by(labeller: Labeller) -> list[dict[str, Any]]:
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 
 
-ON_HOST = {"report": "cells"}
+ON_HOST: dict[str, Any] = {"report": "cells"}
 
-LEVELS = ON_HOST | {"levels": 3, "connectivity": 4}
+LEVELS: dict[str, Any] = ON_HOST | {"levels": 3, "connectivity": 4}
 """Three levels of light cells, from which the host finds the contacts."""
 
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), LEVELS)
@@ -87,7 +87,7 @@ def candidates(
         if protection and not wide:
             wide = protection.refusal(made, at)
             hard.append(wide)
-        ways = itertools.product(*map(enumerate, (methods, scans, bauds or (base.baud,))))
+        ways = itertools.product(enumerate(methods), enumerate(scans), enumerate(bauds or (base.baud,)))
         for (rank, method), (scan_rank, scan), (baud_rank, baud) in ways:
             if "levels" in method and not (made and made.cell):
                 continue
