@@ -10,6 +10,7 @@ from fits import chosen
 from scipy.stats import binom, binomtest
 from zone_oracles import counted
 
+from contactfpga.design.circuit import CircuitError, falling, load_circuit
 from contactfpga.design.cover import Cells, Ellipse, Switch, load_cover
 from contactfpga.design.cover.felt import BODY, Touch
 from contactfpga.skin import Skin
@@ -143,3 +144,20 @@ def test_the_answers_file_has_the_cover_that_was_chosen(file, tmp_path, shortcut
     own = [one for one in options if one not in ("--dome-n", "0.25")]
     assert cli.main(["fit", file(text), *own, "--skin", str(output), "--output", str(again)]) == 0
     assert load_cover(again) == cover
+
+
+def test_an_answer_with_levels_is_a_file_whose_circuit_reads_its_forces(file, tmp_path, shortcuts, monkeypatch):
+    """No other test kills a circuit that does not fit the written ruler, or a table that reads back otherwise."""
+    monkeypatch.setattr(search, "CHECKED", 0)
+    output = tmp_path / "my.toml"
+    text = 'width_mm = 80\nheight_mm = 80\n[[contact]]\nshape = "disc"\nradius_mm = 8\nforce_n = 10\n'
+    options = ["--placements", "100", "--pitch-mm", "16", "--cover", "light", "--labeller", "levels"]
+    loose = ["--miscounted", "10", "--missed", "10", "--barycenter-mm", "none"]
+    assert cli.main(["fit", file(text), *options, *loose, "--output", str(output)]) == 0
+    skin, circuit, cover = Skin.load(output), load_circuit(output), load_cover(output)
+    falling.check(circuit, skin)
+    with pytest.raises(CircuitError, match="the latest sample comes after"):
+        falling.check(circuit, skin.replace(settle_us=skin.settle_us - 1))
+    for level, ruler in enumerate(skin.derived.rulers):
+        ohm = float(cover.cell.ohm(np.array(cover.cell.level_n * 4.0**level)))
+        assert falling.sixteenths(circuit, skin, ohm) == pytest.approx(ruler, rel=0.1, abs=1)

@@ -185,7 +185,8 @@ def toml(fit: Fit, command: str) -> str:
         felt = f", fingertips not felt {_error('unfelt', one.errors['unfelt'])}" if "unfelt" in one.errors else ""
         lines.append(f"{source}, scenes not used to choose: {', '.join(errors)}{felt}{worst}")
     made = fit.answer.candidate.cover
-    circuit = write_circuit(light.circuit_of(made)) if made and made.cell else ""
+    lit = made and made.cell and not fit.task.base.ruler  # else the circuit is that of the user's own file
+    circuit = write_circuit(light.circuit_of(made)) if made and lit else ""
     cover = write_cover(made) if made else ""
     return "".join(f"# {line}\n" for line in lines) + fit.answer.skin.to_toml() + circuit + cover
 
