@@ -176,7 +176,7 @@ def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monke
     thick = dataclasses.replace(kits.kit("starter"), folder=tmp_path)
     rows = list(tables._peak_rows([tables.KitFigures(thick, None, ())]))
     assert [row[1] for row in rows] == [
-        f"**{n}03.0 / {n}03.0 N** forearm, **{n}13.0 / {n}13.0 N** rigid" for n in "214"
+        f"both **{n}03.0 / {n}03.0 N** forearm, **{n}13.0 / {n}13.0 N** rigid" for n in "214"
     ]
     assert all("05.0 / " in row[2] for row in rows)
 

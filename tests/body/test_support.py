@@ -32,7 +32,7 @@ def seen(skin, cells):
         return Zones(Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells), skin.sheet, 0)
     y, x = np.nonzero(cells)
     record, box = [[len(x), x.sum(), y.sum(), *[0] * skin.closed]], [[x.min(), x.max(), y.min(), y.max()]]
-    frame = Frame(0, 0, frozenset(), 0, 0, 1, len(x), np.array(record), None, None, np.array(box))
+    frame = Frame(0, 0, frozenset(), 0, 0, 1, len(x), np.array(record), None, extents=np.array(box))
     return Zones(frame, skin.sheet, 0)
 
 

@@ -9,6 +9,8 @@ import pytest
 from fake_board import FakeBoard
 
 import contactfpga
+from contactfpga import Places
+from contactfpga.tracking.places import Row, Spread
 
 CELLS = contactfpga.Skin(rows=3, columns=6, report="cells", settle_us=20.0)
 
@@ -77,6 +79,19 @@ def test_zones_with_tracks_follows_frames_that_are_not_shown(board, tmp_path, ru
     status, out, _ = run("zones", "--tracks", f"replay://{tmp_path / 'touches.rec'}")
     assert status == 0
     assert len(re.findall(r"│ +2 │ +4 │ 400 │", out)) == 1
+
+
+def test_zones_with_a_table_of_places_shows_contacts_there(board, tmp_path, run):
+    """The first of two cells has the weight 3/4, so x is 2.5 mm where the barycenter's is 5 mm."""
+    parts = [board.hello()]
+    for board.moments in ([(1, 0, 3)], [(2, 1, 6)]):
+        parts.append(board.frame())
+    (tmp_path / "touches.rec").write_bytes(b"".join(parts))
+    table = Places(10.0, 10.0, 0.0, (Row(1, -1.0, 0.0, 9.0),), (Spread(1.0, 0.0),) * 6)
+    (tmp_path / "places.toml").write_text(table.toml())
+    status, out, _ = run("zones", "--places", tmp_path / "places.toml", f"replay://{tmp_path / 'touches.rec'}")
+    assert status == 0
+    assert re.search(r"│ +2 │ 200 │ +2.50 │ 30.00 │", out)
 
 
 def test_zones_records(board, tmp_path, run):

@@ -1,5 +1,5 @@
-"""Places by the order of closings: kills weights that go to the wrong cells, a table that is read wrong, and one that
-is no better than the barycenter under bodies that the contact model did not make."""
+"""Places by the order of closings: kills weights that go to the wrong cells, a table that is read wrong, one that is no
+better than the barycenter under bodies that the contact model did not make, and the covariance of another state."""
 
 import dataclasses
 
@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from tracker_frames import moments, pressed
 
-from contactfpga import Places, Skin, Tracker
+from contactfpga import Places, Skin, Tracker, Zones
 from contactfpga.design import kits
 from contactfpga.design.cover import load_cover, medium
-from contactfpga.tracking.places import PlacesError, Row
+from contactfpga.tracking.places import PlacesError, Row, Spread
 from contactfpga_sim.apps import places
 from contactfpga_sim.lab.cover.elements import Block, touching
 from contactfpga_sim.lab.order import scores
 
 SKIN = Skin(pitch_x_mm=6.0, pitch_y_mm=8.0, connectivity=4)
-TABLE = Places(6.0, 8.0, 50.0, (Row(1, 0.0, 0.0, 4.0, 5.0, 0.0), Row(3, -1.5, 0.5, 0.5, 1.5, 20.0)))
+RISING = ((4.0, 1.0), (5.0, 0.0), (2.0, -2.0))
+SPREADS = tuple(Spread(mm2 / share, power) for share in (1, 2) for mm2, power in RISING)
+TABLE = Places(6.0, 8.0, 50.0, (Row(1, 0.0, 0.0, 0.0), Row(3, -1.5, 0.5, 20.0)), SPREADS)
 TEXT = TABLE.toml()
 
 
@@ -54,7 +56,8 @@ def test_the_place_is_the_weighted_mean_of_the_cells(rng):
             weight = -1.5 * share + 0.5 * share**2 if count > 2 else np.zeros(count)
             weight = (1 + weight - weight.mean()) / count
             assert track.place_mm == pytest.approx((weight @ x, weight @ y), abs=1e-9), number
-            assert track.place_cov_mm2[0] == ((5.0, 4.0, 0.5)[min(count, 3) - 1], 0.0)
+            if not track.merged:
+                assert track.place_cov_mm2[0] == ((4.0, 8.0)[count - 1] if count < 3 else 2 / count**2, 0.0)
         mistaken += track.moved
     assert met > 30
     assert mistaken < 4
@@ -62,6 +65,7 @@ def test_the_place_is_the_weighted_mean_of_the_cells(rng):
         "place_mm",
         "place_cov_mm2",
         "moved",
+        "missed",
     }
 
 
@@ -76,6 +80,50 @@ def test_a_contact_whose_cells_open_has_its_barycenter_until_they_close():
             shown[cell] ^= True
         (track,) = tracker.update(pressed(number * 6000, shown, skin=SKIN)).active
         assert (track.place_mm != track.zone.centroid_mm, track.moved) == (told, False), number
+
+
+def variance(frames):
+    """The variance that is said last of frames, each a time and cells."""
+    tracker = Tracker(places=TABLE)
+    for time_us, cells in frames:
+        shown = np.zeros((16, 16), bool)
+        shown[tuple(np.transpose(cells))] = True
+        (track, *_) = tracker.update(pressed(time_us, shown, skin=SKIN)).active
+    assert track.place_cov_mm2[0][1] == 0.0
+    return track.place_cov_mm2[0][0]
+
+
+@pytest.mark.parametrize(("steps", "rising"), [([1], 4.0), ([1, 2], 8.0), ([1, 2, 4], 2 / 16), ([4], 5.0)])
+def test_a_contact_at_rest_has_the_spread_of_settled_ones(steps, rising):
+    """From twice the time that its cells took to close, and at least twice the time for which they may bounce."""
+    square = [(8, 8), (8, 9), (9, 8), (9, 9)]
+    frames = [(number * 8000, square[:count]) for number, count in enumerate(steps)]
+    end, whole = frames[-1][0], square[: steps[-1]]
+    late = end + 2 * max(end, 5000)
+    for more, expected in (([], rising), ([(late, whole)], rising), ([(late + 1, whole)], rising / 2)):
+        assert variance(frames + more) == pytest.approx(expected)
+
+
+def test_frames_that_a_contact_misses_are_counted_over_the_wrap():
+    """From its first frame on: gaps of 1 and 3, each beside one that is the next."""
+    tracker, shown, said = Tracker(places=TABLE), np.zeros((16, 16), bool), []
+    for time_us, sequence in enumerate((7, 249, 250, 252, 253, 1, 1)):
+        shown[8, 8] = time_us > 0
+        frame = pressed(time_us, shown, skin=SKIN).frame
+        said += tracker.update(Zones(dataclasses.replace(frame, sequence=sequence), SKIN.sheet)).active
+    assert [track.missed for track in said] == [0, 0, 1, 1, 4, 4]
+
+
+def test_a_zone_of_parts_that_met_may_be_any_of_them():
+    """The variance of the parts' middles, by the law of total variance, on average over both axes."""
+    for count in (2, 3):
+        parts = [[(8, column) for column in range(4)], [(9 + row, 9) for row in range(count)]]
+        bridge = [(8, column) for column in range(4, 10)]
+        frames = [(0, [*parts[0], *parts[1]]), (300, [*parts[0], *parts[1], *bridge])]
+        met, alone = variance(frames), variance([(0, parts[0]), (300, [*parts[0], *parts[1], *bridge])])
+        within = sum(len(part) * np.var(np.multiply(part, (8.0, 6.0)), axis=0).sum() for part in parts) / (4 + count)
+        apart = np.var(np.multiply([*parts[0], *parts[1]], (8.0, 6.0)), axis=0).sum() - within
+        assert met - alone == pytest.approx(apart / 2 if count == 3 else 0.0)
 
 
 def test_cells_that_close_at_once_far_apart_or_after_a_part_left_give_the_barycenter():
@@ -110,15 +158,17 @@ def test_a_sheet_that_the_table_cannot_place_is_refused(skin, said):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("linear = -1.5", "linear = nan", "linear is nan; it must be a number from -1e9 to 1e9"),
-        ("place_mm2 = 0.5", "place_mm2 = -1", "place_mm2 is -1; it must be a number from 0 to 1e9"),
+        ("linear = -1.5", "linear = nan", "linear is nan; it must be a number from -1,000,000,000 to 1,000,000,000"),
+        ("one_mm2 = 2.5", "one_mm2 = -1", "one_mm2 is -1; it must be a number from 0 to 1,000,000,000"),
+        ("power = -2", "power = -20", "power is -20; it must be a number from -9 to 9"),
+        ("[[spreads]]\none_mm2 = 2.5\npower = 0\n", "", "there are 5 spreads; there must be 6"),
         ("cells = 3", "cells = 1", "rising from 1"),
         ("linear = -1.5\n", "", "lacks a value"),
         ("least_us = 50", 'least_us = "x"', "least_us is 'x'"),
         ("square = 0.5", "cube = 0.5", "unknown key 'cube' in"),
         ("[[rows]]", "[rows]", "not a TOML file"),
         (TEXT, "rows = 5", "lacks a value"),
-        (TEXT, TEXT + TEXT[TEXT.index("[[rows]]") :] * 60, "there must be 1 to 100"),
+        (TEXT, TEXT + TEXT[TEXT.index("[[rows]]") : TEXT.index("[[spreads]]")] * 60, "there must be 1 to 100"),
     ],
 )
 def test_a_wrong_table_is_refused_in_one_line(tmp_path, old, new, said):
@@ -180,12 +230,15 @@ def test_finite_elements_are_placed_better_than_by_the_barycenter(fitted, tilts)
     assert one.covered > 0.9
 
 
-def test_touches_in_place_are_not_flagged_and_slides_are(fitted, monkeypatch):
+def test_touches_in_place_are_not_flagged_and_slides_and_fast_rolls_are(fitted, monkeypatch):
     monkeypatch.setattr(scores, "table", lambda levels=(1.0,): fitted)
-    still = scores.mean(scores.grown(scores.GROWING[0], number)[-1] for number in range(40))
-    slid = scores.mean(scores.moved(scores.MOVING[1], number)[-1] for number in range(6))
+    still, bar = (scores.mean(scores.grown(case, n)[-1] for n in range(40)) for case in scores.GROWING[0:7:6])
+    slid, rolled = (scores.mean(scores.moved(case, number)[-1] for number in range(6)) for case in scores.MOVING[1::4])
     assert still.ratio + still.half < 0.7
-    assert (still.moved, slid.moved) == (0.0, 1.0)
+    assert min(still.covered, bar.covered) > 0.87
+    radii_mm = [np.sqrt(6 * spread.one_mm2 * 8**spread.power) for spread in fitted.spreads]
+    assert 0.7 < radii_mm[5] < 1.7 < radii_mm[2] < 2.5 < radii_mm[4] < radii_mm[1]  # of eight cells
+    assert (still.moved, slid.moved, rolled.moved) == (0.0, 1.0, 1.0)
 
 
 def test_the_command_writes_what_a_tracker_takes(tmp_path, run):

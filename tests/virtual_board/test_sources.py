@@ -37,6 +37,7 @@ skins = [
     fast.replace(guard=True, self_test=True, labeller="serial", **round),
     fast.replace(report="barycenter", send="on_change", extent=True),
     small.replace(guard=True, precharge_us=0.5, ruler=12),
+    small.replace(guard=True, precharge_us=0.5, ruler=12, harder=(3,), report="cells"),
     small.replace(report="cells", row_order=(2, 1, 0), baud=4_000_000),
 ]
 for skin in skins:

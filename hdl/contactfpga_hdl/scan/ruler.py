@@ -43,7 +43,7 @@ class Ruler:
         ignored = faulty | self._ignored
         falls = (read | ignored).all() & (read & ~ignored).any()
         with m.If(starts):
-            m.d.sync += [sum_.eq(self._asked), step.eq(self._asked), fell.eq(0), late.eq(0)]
+            m.d.sync += [sum_.eq(self._asked), step.eq(self._asked), fell.eq(0), late.eq(self._asked >= self._most)]
         with m.Elif(of_guard):
             m.d.sync += fell.eq(fell | falls)
             with m.If(~fell & ~falls & ~late):

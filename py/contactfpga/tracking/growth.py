@@ -17,6 +17,10 @@ LATE, KNOWN = 2.0, 5
 then, unless it moves."""
 
 
+PART = 3
+"""Least cells of a part that may be a contact of its own in a zone."""
+
+
 class Moments(NamedTuple):
     """Number of cells, and sums of their columns and rows."""
 
@@ -55,6 +59,14 @@ class Growth:
         """Whether the contact did more than grow and shrink in place. It stays so, and nothing more is recorded."""
         self.shrinks = False
         """Whether a cell that had closed is open for longer than it bounces."""
+        self.rest_us = 0
+        """Time since the zone last changed."""
+        self.missed = 0
+        """Frames since the first closing that were not given."""
+        self._changed_us = 0
+        self.apart = 0.0, 0.0
+        """Variances along columns and rows, in cells, of the middles of the parts that met in the zone, by their
+        cells: any of them may be the contact."""
         self._around = around
         self.now = NONE
         """Moments of the zone in the last frame."""
@@ -67,11 +79,18 @@ class Growth:
         """Time from the first closing to the last."""
         return self.closings[-1].time_us - self.closings[0].time_us
 
+    @property
+    def settled(self) -> bool:
+        """Whether the zone has rested for :data:`LATE` times as long as its cells took to close, or may bounce."""
+        return self.rest_us > LATE * max(self.span_us, BOUNCE_US)
+
     def take(self, moments: Moments, time_us: int) -> None:
         """Go on with the contact's zone in the next frame."""
         moments = moments.shifted(self._turn(moments))
         change = moments.plus(self.now, -1)
         self.now = moments
+        self._changed_us = self._changed_us if change == NONE else time_us
+        self.rest_us = time_us - self._changed_us
         if self.moved:
             return
         if change.cells < 0:
@@ -92,7 +111,12 @@ class Growth:
     def join(self, other: Growth) -> None:
         """Add the cells of a contact whose zone is now part of this one's."""
         shift = self._turn(other.now)
-        self.now = self.now.plus(other.now.shifted(shift))
+        there, joined = other.now.shifted(shift), self.now.plus(other.now.shifted(shift))
+        if min(self.now.cells, there.cells) >= PART:
+            share = self.now.cells * there.cells / joined.cells**2
+            off = [self.now[axis] / self.now.cells - there[axis] / there.cells for axis in (1, 2)]
+            self.apart = self.apart[0] + share * off[0] ** 2, self.apart[1] + share * off[1] ** 2
+        self.now = joined
         self.closings = sorted(self.closings + [Closing(at, one.shifted(shift)) for at, one in other.closings])
         open_since = [one._opened_us for one in (self, other) if one._opened.cells]
         self._opened_us = min(open_since, default=0)

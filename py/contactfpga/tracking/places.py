@@ -25,7 +25,7 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.growth import Growth
 
-MOST_ROWS = 100
+MOST_ROWS, SPREADS = 100, 6
 
 
 class PlacesError(ContactFPGAError, ValueError):
@@ -51,12 +51,23 @@ class Row:
     """Least number of cells."""
     linear: float
     square: float
-    place_mm2: float
-    """Variance of the place along each axis."""
-    barycenter_mm2: float
-    """Variance of the barycenter along each axis."""
     reach_mm: float
     """Largest distance of the place from the barycenter. Farther, and the contact moved as it grew."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Spread:
+    """The variance along each axis of the places of zones of n cells: one_mm2 n^power."""
+
+    one_mm2: float
+    power: float
+
+
+LIMITS = {"linear": (-1e9, 1e9), "square": (-1e9, 1e9), "power": (-9.0, 9.0)}
+"""Least and largest value; 0 to 1e9 of the others."""
+
+TOO_FEW = 2
+"""Cells of which a place is the barycenter: where no third one closes soon, the middle of two is the better place."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,9 +76,9 @@ class Places:
     (docs/tracking.md).
 
     >>> zones = contactfpga.read_zones("sim://?scene=two_fingers")
-    >>> from contactfpga.tracking.places import Row
-    >>> row = Row(cells=1, linear=-2.0, square=0.5, place_mm2=0.5, barycenter_mm2=1.5, reach_mm=3.0)
-    >>> places = contactfpga.Places(10.0, 10.0, least_us=200.0, rows=(row,))
+    >>> from contactfpga.tracking.places import Row, Spread
+    >>> row, spread = Row(cells=1, linear=-2.0, square=0.5, reach_mm=3.0), Spread(one_mm2=2.0, power=-1.0)
+    >>> places = contactfpga.Places(10.0, 10.0, least_us=200.0, rows=(row,), spreads=(spread,) * 6)
     >>> contactfpga.Tracker(places=places).update(zones).active[0].place_mm
     (55.0, 75.0)
     """
@@ -78,28 +89,34 @@ class Places:
     """Mean time between closings below which the times say nothing."""
     rows: tuple[Row, ...]
     """By rising number of cells, from 1 on."""
+    spreads: tuple[Spread, ...]
+    """Three of zones whose cells still close, then three of settled ones: of :data:`TOO_FEW` cells, of barycenters, and
+    of places by the times."""
 
     def __post_init__(self) -> None:
         numbers = [(name, getattr(self, name)) for name in ("pitch_x_mm", "pitch_y_mm", "least_us")]
-        numbers += [(name, value) for row in self.rows for name, value in vars(row).items()]
+        parts = self.rows[: MOST_ROWS + 1] + self.spreads[: SPREADS + 1]
+        numbers += [item for part in parts for item in vars(part).items()]
         for name, value in numbers:
-            least = None if name in ("linear", "square") else 0
-            if not is_finite(value) or abs(value) > 1e9 or (least is not None and value < least):
-                limits = "-1e9 to 1e9" if least is None else "0 to 1e9"
-                raise PlacesError(f"{name} is {shown(value)}; it must be a number from {limits}")
+            low, high = LIMITS.get(name, (0.0, 1e9))
+            if not is_finite(value) or not low <= value <= high:
+                raise PlacesError(f"{name} is {shown(value)}; it must be a number from {low:,.0f} to {high:,.0f}")
         counts = [row.cells for row in self.rows[: MOST_ROWS + 1]]
         if not 1 <= len(counts) <= MOST_ROWS or counts[0] != 1 or sorted(set(counts)) != counts:
             raise PlacesError(f"the rows are for {shown(counts)} cells; there must be 1 to {MOST_ROWS}, rising from 1")
+        if len(self.spreads) != SPREADS:
+            raise PlacesError(f"there are {len(self.spreads)} spreads; there must be {SPREADS}")
 
     @classmethod
     def load(cls, path: str | Path) -> Places:
         """The table that ``contactfpga cover places`` wrote. Raises :class:`PlacesError`, OSError."""
         values = tomlfile.fields_of(cls, "places", tomlfile.load(path, PlacesError), PlacesError)
-        rows = values.get("rows")
         try:
-            made = tuple(Row(**tomlfile.fields_of(Row, "rows", row, PlacesError)) for row in rows)  # type: ignore[union-attr]
-            return cls(**{**values, "rows": made})
-        except TypeError:
+            for name, kind in (("rows", Row), ("spreads", Spread)):
+                items = (tomlfile.fields_of(kind, name, item, PlacesError) for item in values[name])
+                values[name] = tuple(kind(**item) for item in items)
+            return cls(**values)
+        except (KeyError, TypeError):
             raise PlacesError(f"{path} lacks a value; write it again with contactfpga cover places") from None
         except PlacesError as error:
             raise PlacesError(f"{path}: {error}") from None
@@ -107,8 +124,9 @@ class Places:
     def toml(self) -> str:
         """The text that :meth:`load` reads."""
         heads = "".join(f"{name} = {getattr(self, name):g}\n" for name in ("pitch_x_mm", "pitch_y_mm", "least_us"))
-        rows = ("".join(f"{name} = {value:.6g}\n" for name, value in vars(row).items()) for row in self.rows)
-        return heads + "".join(f"\n[[rows]]\n{row}" for row in rows)
+        items = [("rows", row) for row in self.rows] + [("spreads", spread) for spread in self.spreads]
+        lines = ("".join(f"{name} = {value:.6g}\n" for name, value in vars(item).items()) for _, item in items)
+        return heads + "".join(f"\n[[{kind}]]\n{text}" for (kind, _), text in zip(items, lines))
 
     def check(self, sheet: Sheet) -> None:
         """Raises :class:`PlacesError` for a sheet whose contacts the table cannot place."""
@@ -123,7 +141,7 @@ class Places:
         """Place of a contact whose zone now has ``cells`` cells and the barycenter (``x_mm``, ``y_mm``)."""
         closings = growth.closings
         recorded = sum(one.closed.cells for one in closings)
-        barycenter = PlaceEstimate(x_mm, y_mm, self._row(cells).barycenter_mm2, growth.moved)
+        barycenter = PlaceEstimate(x_mm, y_mm, self._variance_mm2(growth, cells, False), growth.moved)
         if growth.moved or growth.shrinks or growth.span_us <= self.least_us * (recorded - 1):
             return barycenter
         row = self._row(recorded)
@@ -137,7 +155,13 @@ class Places:
             return barycenter._replace(moved=True)
         x = sum(one.closed.sum_x for one in closings) / recorded
         y = sum(one.closed.sum_y for one in closings) / recorded
-        return PlaceEstimate(self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, row.place_mm2)
+        variance_mm2 = self._variance_mm2(growth, recorded, True)
+        return PlaceEstimate(self.pitch_x_mm * x + dx_mm, self.pitch_y_mm * y + dy_mm, variance_mm2)
+
+    def _variance_mm2(self, growth: Growth, cells: int, told: bool) -> float:
+        apart_mm2 = self.pitch_x_mm**2 * growth.apart[0] + self.pitch_y_mm**2 * growth.apart[1]
+        spread = self.spreads[3 * growth.settled + (0 if cells <= TOO_FEW else 1 + told)]
+        return spread.one_mm2 * math.pow(cells, spread.power) + apart_mm2 / 2
 
     def _row(self, cells: int) -> Row:
         return self.rows[max(0, bisect.bisect_right(self.rows, cells, key=lambda one: one.cells) - 1)]

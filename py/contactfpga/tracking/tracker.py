@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from contactfpga.inputs.values import is_finite, shown
+from contactfpga.skin.derived import SEQUENCE_BITS
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.assignment import assign
 from contactfpga.tracking.growth import Growth, Moments
@@ -68,6 +69,7 @@ class Tracker:
         self._events: list[Event] = []
         self._places = places
         self._growths: dict[int, Growth] = {}
+        self._sequence = 0
 
     def update(self, zones: Zones) -> Tracks:
         """The contacts and events after a frame.
@@ -86,7 +88,7 @@ class Tracker:
         unsure = [] if "mismatch" in zones.flags else self._step(zones)
         active = sorted((spot.track() for spot in self._spots), key=lambda track: track.id)
         if self._places is not None:
-            active = self._placed(self._places, active)
+            active = self._placed(self._places, active, zones.sequence)
         return Tracks(self._time_us, tuple(active), tuple(self._events), tuple(unsure), restarted)
 
     # ---- one frame
@@ -129,9 +131,11 @@ class Tracker:
             self._spots.append(Spot(zone, self._time_us, [self._begin(zone)]))
         return unsure
 
-    def _placed(self, places: Places, active: list[Track]) -> list[Track]:
+    def _placed(self, places: Places, active: list[Track], sequence: int) -> list[Track]:
         """The contacts with their places by the order in which their cells closed."""
         sheet, before, found = self._sheet, self._growths, []
+        missed = (sequence - self._sequence - 1) % (1 << SEQUENCE_BITS) if sequence != self._sequence else 0
+        self._sequence = sequence
         assert sheet is not None
         # The cells that left a zone as it parted are not known. A zone beside one that kept its cells is new.
         areas = {track.id: track.zone.area_cells for track in active}
@@ -151,6 +155,7 @@ class Tracker:
             ]
             for other in others:
                 growth.join(other)
+            growth.missed += missed if growth.closings else 0
             if not track.held:
                 assert zone.sum_x is not None
                 assert zone.sum_y is not None
@@ -161,9 +166,8 @@ class Tracker:
             if self._around_mm is not None:
                 x_mm %= self._around_mm
             covariance = ((variance, 0.0), (0.0, variance))
-            found.append(
-                dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance, moved=growth.moved)
-            )
+            track = dataclasses.replace(track, moved=growth.moved, missed=growth.missed)
+            found.append(dataclasses.replace(track, place_mm=(x_mm, y_mm), place_cov_mm2=covariance))
         return found
 
     def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:

@@ -45,6 +45,9 @@ class Track:
     moved: bool = False
     """With a table of places: whether the contact slid, rolled or parted, so that :attr:`place_mm` is the
     barycenter."""
+    missed: int = 0
+    """With a table of places: frames since the contact began that were lost or left out, as by ``latest()``, by their
+    numbers. Each may have put several closings into one."""
 
     def to_dict(self) -> dict[str, object]:
         """All values as plain Python objects for JSON."""
@@ -62,7 +65,7 @@ class Track:
         } | ({} if self.place_mm is None else self._place())
 
     def _place(self) -> dict[str, object]:
-        return {"place_mm": self.place_mm, "place_cov_mm2": self.place_cov_mm2, "moved": self.moved}
+        return {name: getattr(self, name) for name in ("place_mm", "place_cov_mm2", "moved", "missed")}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

@@ -57,6 +57,8 @@ _FEED_Y = _ROW_Y + VIA_MM / 2 + CLEARANCE_MM + TRACK_MM / 2
 _ROW_START = -2.0
 _GUARD_ROW_Y, _RULER_Y = 4.2, 2.7
 """Distance of the guard row from the last row, and what the ruler's resistors add to it."""
+_BELOW_COMB = 3.3
+"""Distance of a guard row with a ruler from the edge of the last row's cells, with room for its vias."""
 _GUARD_VIA = 0.0, -0.6
 _GUARD_DIODE_X, _RULER_X = -0.35, 1.2
 _RULED_MM = 5.2
@@ -130,7 +132,8 @@ def smallest_pitch(skin: Skin, switch: SwitchPart) -> tuple[float, float]:
 
 
 def _guard_row_y(skin: Skin) -> float:
-    return _GUARD_ROW_Y + _RULER_Y * bool(skin.ruler)
+    below_comb = skin.pitch_y_mm / 2 + _BELOW_COMB
+    return max(_GUARD_ROW_Y + _RULER_Y, below_comb) if skin.ruler else _GUARD_ROW_Y
 
 
 def _too_fine(skin: Skin, switch: SwitchPart) -> list[tuple[str, float, float]]:

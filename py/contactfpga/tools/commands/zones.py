@@ -12,6 +12,7 @@ from contactfpga.robot.haptics import WithReadings
 from contactfpga.robot.haptics.live import FrameSource
 from contactfpga.tools.console import flags, interrupt, live
 from contactfpga.tools.console.forces import Forces
+from contactfpga.tracking.places import Places
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
@@ -25,6 +26,7 @@ def add_flags(flag: flags.Flags) -> None:
     flags.seconds(flag)
     flags.json(flag, flags.FRAMES)
     flag("--tracks", "Follow contacts: show ids that stay from frame to frame.")
+    flag("--places FILE", "Follow contacts, and place them by this table of `contactfpga cover places`.")
     flags.forces(flag, "Show the force at each zone too")
     flag("--record FILE", "Write every byte received to this new file; replay://FILE plays it back.")
 
@@ -50,7 +52,8 @@ class _Follow:
     """Follows contacts over all frames, also those not shown, for ids or forces."""
 
     def __init__(self, args: argparse.Namespace, forces: Forces | None):
-        self._tracker = Tracker() if args.tracks else None
+        places = Places.load(args.places) if args.places else None
+        self._tracker = Tracker(places=places) if args.tracks or places else None
         self._seconds: float | None = args.seconds
         self.tracks: Tracks | None = None
         self.forces = forces

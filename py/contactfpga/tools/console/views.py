@@ -100,19 +100,20 @@ def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
 def table(
     zones: Zones, lines: int | None = None, tracks: Tracks | None = None, contacts: Contacts | None = None
 ) -> Table:
-    """The zones, as many as there are lines for."""
+    """The zones, as many as there are lines for; contacts with places at these."""
     most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
     left_out = len(zones) - most
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
     caption = f"and {left_out} more" if left_out > 0 else None
     made = Table(title=title, caption=caption)
     ids = {} if tracks is None else {id(track.zone): _names(track) for track in tracks.active}
+    places = {} if tracks is None else {id(one.zone): one.place_mm for one in tracks.active if one.place_mm}
     pushes = _pushes(zones, contacts)
     before, after = [] if tracks is None else ["id"], [] if contacts is None else ["N", "from", "to"]
     for heading in (*before, "cells", "mm²", "x mm", "y mm", *after):
         made.add_column(heading, justify="right", no_wrap=True)
     for zone, push in list(zip(zones, pushes))[:most]:
-        x, y = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
+        x, y = ("-" if length is None else f"{length:.2f}" for length in places.get(id(zone), (zone.x_mm, zone.y_mm)))
         name = [] if tracks is None else [ids.get(id(zone), "-")]
         made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", zone.winding or x, y, *push)
     return made

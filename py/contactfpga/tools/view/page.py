@@ -36,11 +36,11 @@ SCRIPT = """
   style.textContent = STYLE;
   document.head.append(style);
   document.title = "contactfpga";
-  setTimeout(() => {
+  setInterval(() => {
     for (const notice of document.querySelectorAll(".mantine-Notification-root"))
       if (notice.textContent.includes("Software WebGL"))
         notice.querySelector(".mantine-Notification-closeButton")?.click();
-  }, 3000);
+  }, 1000);
   addEventListener("pointerdown", () => {
     window.__viserTestpoints?.devSettings.set({enableOrbitCrosshair: false});
     for (const one of window.__viserMutable?.scene?.children ?? [])

@@ -72,14 +72,20 @@ class Case:
     """Share of the frames with a change that are lost, where a board sends no others."""
     sensor: str = "switches"
     """``switches``; ``levels``: cells with :data:`LEVELS`; ``analog``: an 8-bit array read in one frame."""
+    early: bool = False
+    """Whether the time runs from the first crossing of the lightest level and not from when a switch would close."""
     speed_mm_s: float = 0.0
     """Speed at which the contact moves by :data:`FAR_MM`, on a straight line at any angle."""
     rises: bool = False
-    """Whether it moves from the first touch on and not only once its force has risen."""
+    """Whether it moves from when the first cell closes and not only once its force has risen. What moves before that
+    closes no cell."""
 
 
 FAR_MM, WAIT_S = 20.0, 0.02
 """Way of a moving contact, and its rest before it slides."""
+
+RESTS_S = 0.001, 0.003, 0.01, 0.03, 0.1, 0.25
+"""Times after the last change of frames of a touch that settles."""
 
 STEP_MM, STEP_S = 0.1, 1e-3
 """Most from frame to frame of a moving contact."""
@@ -96,8 +102,9 @@ GROWING = (
     Case("a finger, a fifth of the frames lost", lost=0.2),
 )
 TIMED = (
-    *(Case(f"{hz:,.0f} frames per second", body=FIRM, hz=hz) for hz in RATES_HZ),
+    *(Case(f"{hz:,.0f} frames per second{' (reversal)' * (hz > HZ)}", body=FIRM, hz=hz) for hz in RATES_HZ),
     Case("five levels per cell", body=FIRM, sensor="levels"),
+    Case("five levels, from their own first crossing", body=FIRM, sensor="levels", early=True),
     Case("8-bit analog array", body=FIRM, sensor="analog"),
 )
 MOVING = tuple(
@@ -118,7 +125,7 @@ def cover(spread: float | None = None) -> Cover:
 
 @functools.cache
 def table(levels: tuple[float, ...] = (1.0,)) -> Places:
-    return places.fit(SKIN, cover(), levels=levels)
+    return places.fit(SKIN, cover(), 2000 // (1 + len(levels)), levels=levels)
 
 
 def drawn(case: Case, number: int) -> tuple[Scene, np.random.Generator]:
@@ -133,10 +140,11 @@ def drawn(case: Case, number: int) -> tuple[Scene, np.random.Generator]:
 
 
 def frames(changes_s: Floats, hz: float) -> Iterator[Zones]:
-    """The frames in which cells change. (n, rows, columns) ``changes_s`` rise: a cell closes at the first time, opens
-    at the second, and so on."""
+    """The frames in which cells change, and some at rest. (n, rows, columns) ``changes_s`` rise: a cell closes at the
+    first time, opens at the second, and so on."""
     scans = np.ceil(changes_s * hz - 1e-9)
-    for scan in np.unique(scans[np.isfinite(scans)]).tolist():
+    changing = np.unique(scans[np.isfinite(scans)])
+    for scan in (*changing, *(changing[-1:, None] + np.multiply(RESTS_S, hz)).flat):
         yield zones_of((scans <= scan).sum(axis=0) % 2 == 1, round(scan / hz * 1e6), SKIN)[0]
 
 
@@ -192,7 +200,7 @@ def grown(case: Case, number: int) -> Timeline:
         return _analog(scene, where(math.inf)[0], float(closing_s.min()))
     closing_s = closing_s + rng.uniform(0, 1 / case.hz) + rng.uniform(0, max(case.late_s, 1e-12), closing_s.shape)
     if case.sensor == "levels":
-        return _levels(closing_s, case.hz, where(math.inf)[0])
+        return _levels(closing_s, case, where(math.inf)[0])
     if case.bounce_s:
         opens, closes = np.sort(rng.uniform(0, case.bounce_s, (2, *closing_s.shape[1:])), axis=0)
         closing_s = np.concatenate([closing_s, closing_s + opens, closing_s + closes])
@@ -200,27 +208,29 @@ def grown(case: Case, number: int) -> Timeline:
     kept = [one for one in shown[:-1] if rng.random() >= case.lost] + shown[-1:]
     tracker = Tracker(places=table())
     said = [tracker.update(one) for one in kept]
-    return _at([one.time_us for one in said], lambda n: averaged(judged(said[n], where(said[n].time_us / 1e6))))
+    times_us = [one.time_us for one in said]
+    return _at(times_us, lambda n: averaged(judged(said[n], where(said[n].time_us / 1e6))), *times_us[:1])
 
 
-def _at(times_us: list[int], outcome: Callable[[int], Outcome | None]) -> Timeline:
-    """The outcome of the last of rising times before each end."""
-    if not times_us:
+def _at(times_us: list[int], outcome: Callable[[int], Outcome | None], first_us: float = math.inf) -> Timeline:
+    """The outcome of the last of rising times before each end, by the time since the first closing."""
+    if math.isinf(first_us):
         return [None] * (len(AFTER_MS) + 1)
-    ends = [bisect.bisect_right(times_us, times_us[0] + 1e3 * after) for after in AFTER_MS]
+    ends = [bisect.bisect_right(times_us, first_us + 1e3 * after) for after in AFTER_MS]
     return [outcome(end - 1) for end in (*ends, len(times_us))]
 
 
-def _levels(closing_s: Floats, hz: float, place: Place) -> Timeline:
+def _levels(closing_s: Floats, case: Case, place: Place) -> Timeline:
     """A single contact of cells with levels, each crossing of which counts as a closing."""
+    first_s = closing_s.min() if case.early else closing_s[LEVELS.index(1.0)].min()
     times_us, found = [], []
-    for growth in places.grown(closing_s, 1e6 / hz):
+    for growth in places.grown(closing_s, 1e6 / case.hz):
         cells, middle = places.middle(growth, SHEET)
         one = table(LEVELS).of(growth, *middle, cells)
         off = math.dist(one[:2], place)
         times_us.append(growth.closings[-1].time_us)
         found.append(Outcome(off, math.dist(middle, place), _covered(off, one.variance_mm2), one.moved))
-    return _at(times_us, found.__getitem__)
+    return _at(times_us, found.__getitem__, 1e6 * (first_s + 1 / case.hz))
 
 
 def _analog(scene: Scene, place: Place, first_s: float) -> Timeline:
@@ -245,14 +255,17 @@ def moved(case: Case, number: int) -> Timeline:
     """One outcome, over all frames; :attr:`Outcome.moved` is that of the last."""
     scene, rng = drawn(case, number)
     (contact,) = scene.contacts
-    start_s = 0.0 if case.rises else scene.settled_s + WAIT_S
-    end_s, step_s = start_s + FAR_MM / case.speed_mm_s, min(STEP_S, STEP_MM / case.speed_mm_s)
     angle = rng.uniform(0, 2 * math.pi)
     middle = (contacts.at(value, 0.0) for value in (contact.x_mm, contact.y_mm))
-    x, y = (
-        contacts.Track((start_s, end_s), (at - FAR_MM / 2 * turn, at + FAR_MM / 2 * turn))
-        for at, turn in zip(middle, (math.cos(angle), math.sin(angle)))
-    )
+    halves = FAR_MM / 2 * math.cos(angle), FAR_MM / 2 * math.sin(angle)
+    ends = [(at - half, at + half) for at, half in zip(middle, halves)]
+    begins = dataclasses.replace(contact, x_mm=ends[0][0], y_mm=ends[1][0])
+    first_s = float(places.closings(dataclasses.replace(scene, contacts=(begins,)), SKIN, cover()).min())
+    start_s = first_s if case.rises else scene.settled_s + WAIT_S
+    if math.isinf(start_s):
+        return [None]
+    end_s, step_s = start_s + FAR_MM / case.speed_mm_s, min(STEP_S, STEP_MM / case.speed_mm_s)
+    x, y = (contacts.Track((start_s, end_s), both) for both in ends)
     cells = Scene((dataclasses.replace(contact, x_mm=x, y_mm=y),), scene.drawn).on(SKIN, cover())
     tracker, found = Tracker(places=table()), []
     for seconds in np.arange(step_s, max(scene.settled_s, end_s) + WAIT_S, step_s).tolist():
@@ -263,7 +276,8 @@ def moved(case: Case, number: int) -> Timeline:
 
 
 class Mean(NamedTuple):
-    """Means over touches: errors in mm, and the place's over the barycenter's with half of its 95 % interval."""
+    """Means over touches: errors in mm, and the place's over the barycenter's and the share covered, with halves of
+    their 95 % intervals."""
 
     touches: int
     place: float
@@ -271,6 +285,7 @@ class Mean(NamedTuple):
     ratio: float
     half: float
     covered: float
+    covered_half: float
     moved: float
 
 
@@ -278,8 +293,9 @@ def mean(found: Iterable[Outcome | None]) -> Mean:
     place, barycenter, covered, flagged = np.array([one for one in found if one is not None]).T
     ratio = place.mean() / barycenter.mean()
     half = Z95 * (place - ratio * barycenter).std(ddof=1) / math.sqrt(len(place)) / barycenter.mean()
-    means = (float(one) for one in (place.mean(), barycenter.mean(), ratio, half, covered.mean(), flagged.mean()))
-    return Mean(len(place), *means)
+    covered_half = Z95 * covered.std(ddof=1) / math.sqrt(len(place))
+    means = (place.mean(), barycenter.mean(), ratio, half, covered.mean(), covered_half, flagged.mean())
+    return Mean(len(place), *(float(one) for one in means))
 
 
 def _piece(case: Case, first: int) -> list[Timeline]:

@@ -11,9 +11,12 @@ from contactfpga_sim.lab.order.scores import AFTER_MS, GROWING, MOVING, TIMED, C
 
 Found = dict[Case, list[Mean]]
 
-SETTLED = -1
+SETTLED, RISING = -1, AFTER_MS.index(10.0)
 
 WORST = "30 %"
+
+LINES = ("solid", "solid", *style.DASHES, "solid", style.DASHES[1], "solid")
+"""Styles of the barycenter's line and of those of TIMED, of which the fast frame rates lie on each other."""
 
 
 def compute() -> Found:
@@ -22,15 +25,20 @@ def compute() -> Found:
 
 def places_table(found: Found) -> writer.Table:
     """Worst first. The page shows the worst condition alone."""
-    head = ("touches", "number", "barycenter, mm", "place, mm", "place over barycenter, %", "within the ellipse, %")
+    errors = "barycenter, mm", "place, mm", "place over barycenter, %"
+    head = ("touches", "number", *errors, "in the ellipse, %", "in it after 10 ms, %")
     worst = sorted(GROWING, key=lambda case: -found[case][SETTLED].ratio)
-    rows = [(case.title, *_cells(found[case][SETTLED])) for case in worst]
+    rows = [(case.title, *_cells(found[case][SETTLED]), _covered(found[case][RISING])) for case in worst]
     return writer.Table(head, rows, lambda row: "," not in row[0] or WORST in row[0])
 
 
 def _cells(one: Mean) -> tuple[str, ...]:
     ratio = f"{100 * one.ratio:.1f} ± {100 * one.half:.1f}"
-    return f"{one.touches}", f"{one.barycenter:.2f}", f"{one.place:.2f}", ratio, f"{100 * one.covered:.0f}"
+    return f"{one.touches}", f"{one.barycenter:.2f}", f"{one.place:.2f}", ratio, _covered(one)
+
+
+def _covered(one: Mean) -> str:
+    return f"{100 * one.covered:.0f} ± {100 * one.covered_half:.0f}"
 
 
 def moves_table(found: Found) -> writer.Table:
@@ -60,9 +68,10 @@ def draw(folder: Path, found: Found) -> Path:
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(3.4)
         axes = figure.subplots()
-        for (title, errors), color in zip(lines.items(), (style.GRAY, *style.PALETTE)):
-            axes.plot(AFTER_MS, errors[:SETTLED], color=color, marker="o", ms=4, label=title)
-        axes.set(xscale="log", ylim=(0, 3.6), xlabel="time since the first cell closed, ms", ylabel="mean error, mm")
+        colors = (style.GRAY, *(one for one in style.PALETTE if one != style.GRAY))
+        for (title, errors), color, dashes in zip(lines.items(), colors, LINES, strict=True):
+            axes.plot(AFTER_MS, errors[:SETTLED], color=color, ls=dashes, marker="o", ms=3.5, label=title)
+        axes.set(xscale="log", ylim=(0, 4.0), xlabel="time since the first switch closed, ms", ylabel="mean error, mm")
         axes.set_xticks(AFTER_MS, [f"{after:g}" for after in AFTER_MS])
         axes.minorticks_off()
         axes.grid(True)

@@ -21,8 +21,6 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     skin = bare_skin(board, "what one frame shows")
     if not skin.ruler:
         raise ContactFPGAError(f"{board.port} has switches, which have no rest level; --rest needs a Skin with a ruler")
-    if skin.harder:
-        raise ContactFPGAError(f"{board.port} tells levels of force; --rest needs a board built without `harder`")
     if not args.json:
         terminal.say(f"Leave {board.port} untouched until its rest levels are known.")
     rest, end = Rest((skin.rows, skin.columns)), []
@@ -53,6 +51,8 @@ def levels(board: Board, timeout: float) -> Rest:
 
 
 def _search(board: Board, rest: Rest, timeout: float) -> None:
+    for harder in range(2, board.sheet.levels + 1):
+        board.sample_at(1, timeout, level=harder)  # so early that the lightest level alone decides what reads pressed
     while (level := rest.next_level()) is not None:
         rest.take(level, _cells(board.sample_at(level, timeout)))
 

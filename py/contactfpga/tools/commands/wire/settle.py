@@ -100,7 +100,8 @@ def restored(board: Board, timeout: float) -> list[Finding]:
     for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
         with interrupt.usual_end():
             try:
-                board.sample_at(0, timeout)
+                for level in range(1, board.sheet.levels + 1):
+                    board.sample_at(0, timeout, level=level)
                 return []
             except ContactFPGAError:
                 break
