@@ -1,5 +1,5 @@
 """Pitch, cover and levels of `contactfpga fit`: against a search that tries everything, and against binomial chances.
-No other test kills a race that refuses what is good enough, or an order from dear to cheap."""
+No other test kills an order from dear to cheap."""
 
 import dataclasses
 import math
