@@ -164,11 +164,11 @@ def test_peak_forces_in_the_readme_are_those_of_a_kits_own_cover(tmp_path, monke
 
     def made_up(study, workers):
         return {
-            each: [[Peaks(np.array([force(one, way)]), None, None)] * 2 for way in (1, 2, 3, 4)]
+            each: [[Peaks(np.array([force(one, way)]), None, None, None)] * 2 for way in (1, 2, 3, 4)]
             for each, (one, _) in study.items()
         }
 
-    monkeypatch.setattr(kits_arm, "ways", lambda kit, finger: ((),) * 4)
+    monkeypatch.setattr(kits_arm, "ways", lambda skin, finger: ((),) * 4)
     monkeypatch.setattr(kits_arm.anywhere, "ways", lambda case, skin: ((),) * 4)
     monkeypatch.setattr(kits_arm.anywhere, "many", made_up)
     text = kits.kit("starter").skin_path.read_text()

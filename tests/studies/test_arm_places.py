@@ -12,7 +12,7 @@ from contactfpga.design.cover import BODIES, Cap, Cover, Switch, cells_of
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import result_cache
-from contactfpga_sim.lab.arm import anywhere, places
+from contactfpga_sim.lab.arm import anywhere, kits, places
 from contactfpga_sim.lab.arm.anywhere import BEST, FLUSH, GEOMETRIES, WAYS, Geometry
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.places import Peaks
@@ -57,7 +57,7 @@ def test_a_lower_threshold_raises_no_touchs_peak(face):
     for threshold in (1.0, 0.4, 0.2):
         case = Geometry(face, 10.0, threshold, 5.0).case()
         (found,) = places._touched(places.Batch(case, Skin(), ((0.8e-3,),), 4, 0))
-        forces.append([force for force, _, _ in found])
+        forces.append([force for force, *_ in found])
     assert all((np.array(lower) <= 1.005 * np.array(higher)).all() for higher, lower in itertools.pairwise(forces))
     assert np.mean(forces[2]) < np.mean(forces[0]) - 0.5
 
@@ -99,7 +99,10 @@ def test_forces_between_those_looked_at_follow_the_cells_themselves():
 
 def halves(first, second, limited=0.0):
     marks = np.arange(len(first)) < limited * len(first)
-    return [Peaks(np.asarray(one, float), np.full(len(one), 2e-3), marks) for one in (first, second)]
+    return [
+        Peaks(np.asarray(one, float), np.full(len(one), 2e-3), marks, np.full(len(one), np.nan))
+        for one in (first, second)
+    ]
 
 
 def test_a_worst_value_that_another_seed_changes_gives_way_to_a_quantile():
@@ -157,3 +160,16 @@ def test_the_command_says_what_touches_anywhere_come_to(tmp_path, monkeypatch, c
     assert (forces[1] <= forces[0]).all()
     assert (forces[2] <= forces[1] + 0.3).all()
     assert all(known["limit alone"]["torque_limit_first"])
+
+
+def test_the_depth_at_the_contact_is_that_of_the_course():
+    """No other test kills a depth taken at another time, or a touch without detection that counts as one."""
+    record = run(Case.load("paper"), "latency", latency_s=1e-3)
+    outcome, course = record.outcome, record.course
+    after = int(np.searchsorted(course["time_s"], outcome.detected_s))
+    low, high = course["indentation_m"][after - 1 : after + 1]
+    assert low <= outcome.detected_m <= high
+    assert 0 < outcome.detected_m < outcome.peak_indentation_m
+    assert run(Case.load("paper"), "torque").outcome.detected_m is None
+    told = kits.depth_text([Peaks(*np.zeros((3, 2)), np.array(depths)) for depths in ([1e-3, np.nan], [2e-3, 4e-3])])
+    assert told == "4.00 / 2.33"

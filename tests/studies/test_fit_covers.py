@@ -1,4 +1,5 @@
-"""Pitch and cover of `contactfpga fit`: against a search that tries everything, and against binomial chances."""
+"""Pitch, cover and levels of `contactfpga fit`: against a search that tries everything, and against binomial chances.
+No other test kills an order from dear to cheap."""
 
 import dataclasses
 import math
@@ -6,9 +7,10 @@ import math
 import numpy as np
 import pytest
 from fits import chosen
-from scipy import ndimage
-from scipy.stats import binom
+from scipy.stats import binom, binomtest
+from zone_oracles import counted
 
+from contactfpga.design.circuit import CircuitError, falling, load_circuit
 from contactfpga.design.cover import Cells, Ellipse, Switch, load_cover
 from contactfpga.design.cover.felt import BODY, Touch
 from contactfpga.skin import Skin
@@ -16,17 +18,18 @@ from contactfpga.tools import cli
 from contactfpga_sim.apps import stats
 from contactfpga_sim.apps.covers import tiled
 from contactfpga_sim.apps.fit import faces, measuring, search
-from contactfpga_sim.apps.fit.candidates import candidates
+from contactfpga_sim.apps.fit.candidates import LEVELS, candidates
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals
+from contactfpga_sim.apps.light import Reading, Sensed
 
 pytestmark = pytest.mark.usefixtures("alone")
 
 PITCHES = (8.0, 10.0, 40 / 3, 20.0)
 LIMIT = 0.15
-SURELY = 0.02
-"""Three standard deviations of either count more than this are still below the limit's interval."""
-NEW = 200
+SURELY = 0.03
+"""Distance from the limit beyond which the race must decide."""
+NEW = 300
 """Scenes on which everything is tried."""
 
 
@@ -38,46 +41,54 @@ def random_file(seed):
     return f"width_mm = 80\nheight_mm = 80\ngap_mm = {rng.uniform(6, 16)}\nseed = {seed}\n[[contact]]\n{contacts}"
 
 
-def miscounted(given, lines, cover, numbers, structure):
-    """Share of scenes with another number of pieces of closed switches than contacts were drawn."""
-    skin = Skin(rows=lines, columns=lines, pitch_x_mm=80 / lines, pitch_y_mm=80 / lines, settle_us=20.0)
-    cells = Cells(cover, lines, lines, 0.08 / lines, 0.08 / lines)
-    wrong = 0
+def miscounted(given, one, numbers):
+    """Share of scenes with another number of pieces, or of parts that last, than contacts were drawn."""
+    skin, settings, wrong = one.skin, dict(one.settings), 0
+    lines = settings["rows"]
+    cells = Cells(one.cover, lines, lines, 0.08 / lines, 0.08 / lines)
     for number in numbers:
         scene, seconds = given.at(skin, skin, number)
-        _, count = ndimage.label(cells.closed(scene.loads(seconds)), structure)
-        wrong += count != len(scene.contacts)
-    return wrong / len(numbers)
+        forces = cells.forces_n(scene.on_cover(skin, one.cover).loads(seconds))
+        if one.cover.cell is None:
+            read = (forces >= cells.thresholds_n).astype(int)
+        else:
+            level_n, count = one.cover.cell.level_n, settings.get("levels", 1)
+            steps = tuple(level_n * 4.0**level for level in range(count))
+            read = Sensed(forces, scene.drawn, number).levels(Reading(steps))
+        wrong += counted(read, settings["connectivity"], 2 if "levels" in settings else 1) != len(scene.contacts)
+    return wrong
 
 
-def agrees(path):
-    """Whether the chosen sheet is the coarsest that is good enough on many newly drawn scenes, within chance."""
-    made = faces.faces(("caps", "tiles"), (0.4,))
-    given, count = source(path), 200
-    methods = [{"labeller": "serial", "report": "moments", "connectivity": c} for c in (4, 8)]
-    tried = candidates(Skin(), [(p, p) for p in PITCHES], (80.0, 80.0), methods, ["raster"], covers=made)
-    found = chosen(path, tried=tried, count=count, miscounted=LIMIT, missed=None, barycenter_mm=None, unfelt=None)
-    shares = {
-        (lines, name, connectivity): miscounted(
-            given, lines, made[name](80 / lines), range(1000, 1000 + NEW), structure
-        )
-        for lines in (4, 6, 8, 10)
-        for name in made
-        for connectivity, structure in ((4, None), (8, np.ones((3, 3))))
+def check(path):
+    """Fail unless the answer is good enough on newly drawn scenes, and nothing cheaper surely is, within chance."""
+    made = {
+        name: face for name, face in faces.faces().items() if name in ("caps, 0.4 N", "tiles, 0.4 N", "light, 0.1 N")
     }
-    surely = {one for one, share in shares.items() if share <= SURELY}
-    perhaps = {one for one, share in shares.items() if share < LIMIT + 2 * math.sqrt(LIMIT * (1 - LIMIT) / NEW)}
-    if found.answer is None:
-        return not surely
-    settings = dict(found.answer.candidate.settings)
-    good = (settings["rows"], settings["cover"], settings["connectivity"]) in perhaps
-    return good and settings["rows"] <= min((lines for lines, _, _ in surely), default=10)
+    methods = [{"labeller": "serial", "report": "moments", "connectivity": 4}, LEVELS]
+    tried = candidates(Skin(), [(p, p) for p in PITCHES], (80.0, 80.0), methods, ["raster"], covers=made)
+    found = chosen(path, tried=tried, count=200, miscounted=LIMIT, missed=None, barycenter_mm=None, unfelt=None)
+    given, good = source(path), [(math.inf,)]
+    for one in tried:
+        settings = dict(one.settings)
+        cost = (2 * settings["rows"], settings["cover"].startswith("light"), "levels" in settings)
+        chance = binomtest(miscounted(given, one, range(10_000, 10_000 + NEW)), NEW).proportion_ci(0.998, "wilson")
+        if found.answer and one == found.answer.candidate:
+            assert chance.low <= LIMIT
+            answer = cost
+        if chance.high <= LIMIT - SURELY:
+            good.append(cost)
+    assert (answer if found.answer else (math.inf,)) <= min(good)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_the_sheet_is_the_coarsest_of_all_that_are_good_enough(seed, file, shortcuts):
-    assert agrees(file(random_file(seed)))
+@pytest.mark.parametrize("seed", range(3))
+def test_the_answer_is_the_cheapest_of_all_that_are_good_enough(seed, file, shortcuts):
+    check(file(random_file(seed)))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(3, 53))
+def test_answers_to_more_files_are_the_cheapest(seed, file, shortcuts):
+    check(file(random_file(seed)))
 
 
 def test_a_share_lies_beyond_its_bound_no_more_often_than_said():
@@ -101,17 +112,21 @@ def test_a_race_ends_as_soon_as_a_limit_is_surely_met_or_missed():
     assert measuring.decided(goals, {"miscounted": [0.0] * 160, "unfelt": [1.0, *[0.0] * 159]}, 6) is None
 
 
+def unfelt(cover, force, numbers):
+    return faces.unfelt(cover, (10.0, 10.0), faces.touches(cover, (10.0, 10.0), force, numbers))
+
+
 def test_a_fingertip_is_felt_where_the_least_closing_force_is_reached():
     """Without spread as `cover felt` says, which other tests judge."""
     cover = dataclasses.replace(tiled(10.0), switch=Switch(0.4))
     for force, expected in ((0.39, 1.0), (8.0, 0.0)):
-        assert set(faces.unfelt(cover, (10.0, 10.0), force, range(20))) == {expected}
+        assert set(unfelt(cover, force, range(20))) == {expected}
     cells, rng = Cells(cover, 9, 9, 0.01, 0.01), np.random.default_rng(1)
     touch = Touch(cells, Ellipse(6e-3, 5e-3), BODY)
     places = zip(*rng.uniform(35e-3, 45e-3, (2, 400)), rng.uniform(0, math.pi, 400))
     least = np.array([touch.closing_n(cells.thresholds_n[None], *place)[0][0] for place in places])
     for force in (0.6, 0.8, 1.0):
-        share = np.mean(faces.unfelt(cover, (10.0, 10.0), force, range(50)))
+        share = np.mean(unfelt(cover, force, range(50)))
         assert share == pytest.approx(np.mean(least > force), abs=4 * 0.5 / math.sqrt(400) * math.sqrt(2))
 
 
@@ -129,3 +144,20 @@ def test_the_answers_file_has_the_cover_that_was_chosen(file, tmp_path, shortcut
     own = [one for one in options if one not in ("--dome-n", "0.25")]
     assert cli.main(["fit", file(text), *own, "--skin", str(output), "--output", str(again)]) == 0
     assert load_cover(again) == cover
+
+
+def test_an_answer_with_levels_is_a_file_whose_circuit_reads_its_forces(file, tmp_path, shortcuts, monkeypatch):
+    """No other test kills a circuit that does not fit the written ruler, or a table that reads back otherwise."""
+    monkeypatch.setattr(search, "CHECKED", 0)
+    output = tmp_path / "my.toml"
+    text = 'width_mm = 80\nheight_mm = 80\n[[contact]]\nshape = "disc"\nradius_mm = 8\nforce_n = 10\n'
+    options = ["--placements", "100", "--pitch-mm", "16", "--cover", "light", "--labeller", "levels"]
+    loose = ["--miscounted", "10", "--missed", "10", "--barycenter-mm", "none"]
+    assert cli.main(["fit", file(text), *options, *loose, "--output", str(output)]) == 0
+    skin, circuit, cover = Skin.load(output), load_circuit(output), load_cover(output)
+    falling.check(circuit, skin)
+    with pytest.raises(CircuitError, match="the latest sample comes after"):
+        falling.check(circuit, skin.replace(settle_us=skin.settle_us - 1))
+    for level, ruler in enumerate(skin.derived.rulers):
+        ohm = float(cover.cell.ohm(np.array(cover.cell.level_n * 4.0**level)))
+        assert falling.sixteenths(circuit, skin, ohm) == pytest.approx(ruler, rel=0.1, abs=1)

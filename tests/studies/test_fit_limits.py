@@ -4,7 +4,7 @@ import itertools
 import re
 
 import pytest
-from fits import BUMPER, HANDS, chosen
+from fits import BUMPER, chosen
 from scipy.stats import binomtest
 
 from contactfpga.design.cover.stopping import peak_forces
@@ -13,7 +13,7 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.apps import speed
 from contactfpga_sim.apps.fit import search
-from contactfpga_sim.apps.fit.candidates import METHODS, candidates, pitches_for, size_for
+from contactfpga_sim.apps.fit.candidates import METHODS, ON_HOST, candidates, pitches_for, size_for
 from contactfpga_sim.apps.fit.faces import Protection, faces
 from contactfpga_sim.apps.fit.sources import source
 from contactfpga_sim.apps.fit.trial import Goals, Measurement
@@ -35,7 +35,8 @@ def test_a_latency_that_is_too_long_is_refused_with_its_worst(file, shortcuts, m
     monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
     path, given = file(BUMPER), source(file(BUMPER))
     tried = candidates(Skin(), [(20.0, 20.0)], (80.0, 80.0), METHODS[:1], ["raster"])
-    frames = given.cells(tried[0].skin, Skin(), [index * 100 // 6 for index in range(6)], 100)
+    looked = given.looks(tried[0].skin, Skin(), [index * 100 // 6 for index in range(6)], 100)
+    frames = [cells for cells, _ in looked]
     worst = MEASURE(tried[0].skin, frames, 0).worst_us
     found = chosen(path, tried=tried, latency_us=worst, barycenter_mm=8.0)
     assert found.answer.measured[0].speed.worst_us == worst
@@ -84,15 +85,11 @@ def test_touches_of_the_answer_go_through_the_gateware_as_well(file, shortcuts):
     assert [one for one in shortcuts.checked if one[1]] == [(found.answer.skin, 2)]
 
 
-@pytest.mark.slow
-def test_bitmaps_need_a_host_that_says_its_time(file, shortcuts):
-    path = file(HANDS)
-    refused = next(one for one in chosen(path).cheaper if one.skin.report == "cells")
-    assert refused.refusals[0] == "reports no zones: say with --host-us how long the host takes to find them"
-    admitted = chosen(path, host_us=100.0)
-    assert admitted.answer.skin.report == "cells"
-    alike = next(one for one in chosen(path).cheaper if one.skin == admitted.answer.skin)
-    assert admitted.answer.measured[0].speed.worst_us == alike.measured[0].speed.worst_us + 100
+def test_the_hosts_time_is_added_to_the_latency_of_a_map(file, shortcuts):
+    path = file(BUMPER)
+    tried = candidates(Skin(), [(20.0, 20.0)], (80.0, 80.0), [ON_HOST], ["raster"])
+    alone, helped = (chosen(path, tried=tried, host_us=each, barycenter_mm=8.0).answer for each in (None, 100.0))
+    assert helped.measured[0].speed.worst_us == alone.measured[0].speed.worst_us + 100
 
 
 def test_nothing_that_meets_the_limits_gives_the_nearest(file, shortcuts):
@@ -110,14 +107,15 @@ def measured(**errors):
     return Measurement(usual | errors, Speed(100.0, 200.0, 50.0, 17.0, 60.0, 1e4))
 
 
-def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_mean():
+def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_lower():
     goals = Goals(miscounted=0.05, latency_us=200.0)
     doubtful = measured(miscounted=Interval(0.04, 0.02, 0.08, 100))
-    message = "miscounts 4 % of scenes (2 to 8), limit 5 %: too few scenes to tell"
+    message = "miscounts 4 % of scenes (2 to 8), limit 5 %; more --placements may tell"
     assert list(goals.misses(doubtful)) == [(pytest.approx(1.6), message)]
     assert list(goals.misses(doubtful, sure=False)) == []
-    wrong = measured(miscounted=Interval(0.06, 0.05, 0.07, 100))
-    assert [words for _, words in goals.misses(wrong, sure=False)] == ["miscounts 6 % of scenes (5 to 7), limit 5 %"]
+    assert list(goals.misses(measured(miscounted=Interval(0.06, 0.049, 0.07, 100)), sure=False)) == []
+    wrong = measured(miscounted=Interval(0.06, 0.051, 0.07, 100))
+    assert [words for _, words in goals.misses(wrong, sure=False)] == ["miscounts 6 % of scenes (5.1 to 7), limit 5 %"]
     assert goals.excess(measured()) == 1
 
 
@@ -126,24 +124,21 @@ def test_a_share_that_so_few_scenes_cannot_show_is_refused():
     for limit in (0.5, 0.05, 0.003):
         need = next(n for n in itertools.count(1) if binomtest(0, n).proportion_ci(method="wilson").high <= limit)
         Goals(miscounted=limit, missed=None).check_count(need)
-        with pytest.raises(ValueError, match=f"take {need} scenes or more"):
+        with pytest.raises(ValueError, match=f"give --placements {need} or more"):
             Goals(miscounted=limit, missed=None).check_count(need - 1)
 
 
 # ---- what it costs
 
 
-@pytest.mark.slow
-def test_no_sheet_with_more_wires_than_the_answer_is_synthesized(file, shortcuts):
+def test_the_answer_alone_is_synthesized_and_nothing_dearer_is_measured(file, shortcuts):
     pitches = (5.0, 8.0, 10.0, 16.0, 20.0)
     found = chosen(file(BUMPER), pitches=pitches)
+    assert shortcuts.sized == [found.answer.skin]
+    assert all(one.cost < found.answer.cost for one in found.cheaper)
     everything = candidates(Skin(), [(pitch, pitch) for pitch in pitches], (80.0, 80.0))
-    possible = [one for one in everything if one.skin is not None]
-    assert {skin.rows + skin.columns for skin in shortcuts.sized} == {found.answer.wires}
-    assert len(set(shortcuts.sized)) == len(shortcuts.sized)
-    fewer = {one.skin for one in possible if one.skin.rows + one.skin.columns < found.answer.wires}
-    assert fewer == {one.skin for one in found.cheaper if one.wires < found.answer.wires}
-    assert found.dearer == len(possible) - len(found.cheaper) - 1
+    fewer = {one for one in everything if one.skin is not None and one.wires < found.answer.cost[0]}
+    assert fewer == {one.candidate for one in found.cheaper if one.cost[0] < found.answer.cost[0]}
 
 
 # ---- what is tried
@@ -163,14 +158,14 @@ def test_candidates_are_what_was_asked_for(file):
         assert one.skin.debounce == "sym_defer_pk"
         assert one.skin.mask == (((1, 2),) if (one.skin.rows, one.skin.columns) == (12, 9) else ())
     own = [one for one in tried if dict(one.settings)["rows"] == 12 and dict(one.settings)["columns"] == 9]
-    assert len(own) == 2 * len(METHODS)
+    assert len(own) == 2 * (len(METHODS) - 1)  # levels need light cells
 
 
 def test_a_skin_that_cannot_be_is_listed_with_its_reason(file, shortcuts):
     found = chosen(file(BUMPER), pitches=(1.0, 20.0))
-    assert all(one.refusals[0].startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in
-               found.impossible if dict(one.candidate.settings)["rows"] == 80)  # fmt: skip
-    assert len([one for one in found.impossible if dict(one.candidate.settings)["rows"] == 80]) == len(METHODS)
+    assert all(one.refusal.startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in
+               found.impossible if dict(one.settings)["rows"] == 80)  # fmt: skip
+    assert len([one for one in found.impossible if dict(one.settings)["rows"] == 80]) == len(METHODS) - 1
 
 
 def test_sheets_that_differ_are_refused(file):

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from contactfpga.design.cover import BODIES, Cover
+from contactfpga_sim.apps import light
 from contactfpga_sim.apps.covers import FOAM_M, sheet
+from contactfpga_sim.apps.light import Reading, Sensed
 from contactfpga_sim.apps.score import MODELS, Interval, Score
-from contactfpga_sim.lab.benchmark import entries, scenes
-from contactfpga_sim.lab.benchmark.entries import Reading, Sensed
+from contactfpga_sim.lab.benchmark import scenes
 from contactfpga_sim.lab.benchmark.pressed import FOAM_MM, Contact, flesh, pressed, tiles
 from contactfpga_sim.lab.benchmark.scenes import FAMILIES
 from contactfpga_sim.lab.cover.elements import touching
@@ -91,7 +92,7 @@ def test_an_untouched_sheet_reads_nothing_however_old_its_preload(monkeypatch):
     """Without the guard some sheets do."""
     reading, rest = Reading((0.05, 0.2)), np.zeros((40, 40))
     assert not any(Sensed(rest, seed).levels(reading).any() for seed in range(100))
-    monkeypatch.setattr(entries, "GUARD", 1.0)
+    monkeypatch.setattr(light, "GUARD", 1.0)
     assert any(Sensed(rest, seed).levels(reading).any() for seed in range(100))
 
 

@@ -17,15 +17,6 @@ SECOND = '[[contact]]\nshape = "disc"\nradius_mm = 12\n'
 APART = "gap_mm = 16\n"
 HANDS = APART + BUMPER.replace("[12, 18]", "12") + "number = [2, 3]\n"
 
-LUTS = {"cells": 300, "single": 500, "serial": 520, "projection": 560, "run": 800}
-
-
-def made_up(skin):
-    """LUT4 in the order that synthesis finds, without its minutes."""
-    by = "cells" if skin.report == "cells" else skin.labeller
-    more = 20 * (skin.connectivity == 4 and by in ("serial", "run"))
-    return LUTS[by] + more + 5 * (skin.rows + skin.columns)
-
 
 class Shortcuts:
     """What was asked of them."""
@@ -36,7 +27,7 @@ class Shortcuts:
 
     def luts_of(self, skin):
         self.sized.append(skin)
-        return made_up(skin)
+        return 400 + skin.rows + skin.columns
 
     def measure(self, skin, frames, checked):
         self.checked.append((skin, checked))
@@ -48,7 +39,7 @@ class Shortcuts:
 def chosen(*names, pitches=(10.0, 20.0), shuffled=None, tried=None, **limits):
     """The fit on these scenes, and the candidates in the order of ``shuffled``."""
     given = tuple(map(source, names))
-    options = {name: limits.pop(name) for name in ("host_us", "quick", "base") if name in limits}
+    options = {name: limits.pop(name) for name in ("host_us", "base") if name in limits}
     count = limits.pop("count", None) or sources.default_count(given)
     base = options.pop("base", None)
     if tried is None:

@@ -151,3 +151,22 @@ def zones_by_image_tools(cells, labeller):
         runs, number = ndimage.label(inside.any(axis=0))
         found += [moments(inside & (runs == run)) for run in range(1, number + 1)]
     return found
+
+
+# ---- maps of levels
+
+STRUCTURES = {4: ndimage.generate_binary_structure(2, 1), 8: np.ones((3, 3))}
+
+
+def count(where, levels, floor, lasts, structure):
+    """Contacts in the cells ``where``, which are connected from the level ``floor`` on."""
+    parts, number = ndimage.label(where & (levels > floor), structure)
+    each = [parts == part for part in range(1, number + 1)]
+    lasting = [one for one in each if levels[one].max() >= floor + lasts]
+    return max(1, sum(count(one, levels, floor + 1, lasts, structure) for one in lasting))
+
+
+def counted(levels, connectivity, lasts):
+    """Contacts in a map of levels, by the tree of its parts."""
+    zones, number = ndimage.label(levels > 0, STRUCTURES[connectivity])
+    return sum(count(zones == zone, levels, 1, lasts, STRUCTURES[connectivity]) for zone in range(1, number + 1))

@@ -7,23 +7,9 @@ import tracemalloc
 import numpy as np
 import pytest
 from scipy import ndimage
+from zone_oracles import counted
 
 from contactfpga.zones import labels, levels
-
-STRUCTURES = {4: ndimage.generate_binary_structure(2, 1), 8: np.ones((3, 3))}
-
-
-def count(where, levels, floor, lasts, structure):
-    """Contacts in the cells ``where``, which are connected from the level ``floor`` on."""
-    parts, number = ndimage.label(where & (levels > floor), structure)
-    each = [parts == part for part in range(1, number + 1)]
-    lasting = [one for one in each if levels[one].max() >= floor + lasts]
-    return max(1, sum(count(one, levels, floor + 1, lasts, structure) for one in lasting))
-
-
-def counted(levels, connectivity, lasts):
-    zones, number = ndimage.label(levels > 0, STRUCTURES[connectivity])
-    return sum(count(zones == zone, levels, 1, lasts, STRUCTURES[connectivity]) for zone in range(1, number + 1))
 
 
 @pytest.mark.parametrize("connectivity", [4, 8])

@@ -8,6 +8,7 @@ the cell's current: dV = (R + n kT/q / (I + Is)) dI. Cells of a row that fall to
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -134,15 +135,22 @@ def sixteenths(circuit: Circuit, skin: Skin, ohm: float) -> int:
     return round(float(min(usual * SIXTEENTHS, 1e6)))
 
 
+@functools.lru_cache(maxsize=1024)
+def latest_us(circuit: Circuit, rows: int, columns: int, ruler: int) -> float:
+    """Time of the latest sample at all corners with a Skin's ``ruler``: the least settle time. Raises
+    :class:`CircuitError` if the columns do not fall."""
+    conditions = {ruler for ruler, _ in corners(circuit, rows, columns, 0.0)}
+    most_us = max(1e6 * ruler_s(circuit, rows, columns, one) for one in conditions)
+    if math.isinf(most_us):
+        what = f"columns do not fall through the ruler: column_pull_ohm = {circuit.column_pull_ohm:g}, or hot diodes"
+        raise CircuitError(f"{what}, feed them; leave that resistor out (1e8), and take silicon diodes")
+    return most_us * max(ruler, SIXTEENTHS) / SIXTEENTHS
+
+
 def check(circuit: Circuit, skin: Skin) -> None:
     """Raise :class:`CircuitError` if a Skin's columns cannot fall, or the settle time is too short for its sample."""
     if not skin.ruler:
         raise CircuitError("ruler is 0; [circuit.falling] needs a Skin with a ruler, such as ruler = 16")
-    lines = skin.row_lines, skin.columns
-    most_us = max(1e6 * ruler_s(circuit, *lines, ruler) for ruler, _ in corners(circuit, *lines, 0.0))
-    if math.isinf(most_us):
-        what = f"columns do not fall through the ruler: column_pull_ohm = {circuit.column_pull_ohm:g}, or hot diodes"
-        raise CircuitError(f"{what}, feed them; leave that resistor out (1e8), and take silicon diodes")
-    if (needed_us := most_us * max(skin.ruler, SIXTEENTHS) / SIXTEENTHS) > skin.settle_us:
+    if (needed_us := latest_us(circuit, skin.row_lines, skin.columns, skin.ruler)) > skin.settle_us:
         late = f"with ruler = {skin.ruler} the latest sample comes after {needed_us:.1f} us"
         raise CircuitError(f"settle_us is {skin.settle_us:g}; {late}")

@@ -175,6 +175,15 @@ def load_circuit(path: str | Path) -> Circuit | None:
     return tomlfile.load_table(path, "circuit", _read, CircuitError)
 
 
+def write_circuit(circuit: Circuit) -> str:
+    """The TOML tables that :func:`load_circuit` reads back."""
+    values = dataclasses.asdict(circuit)
+    tables = {f"circuit.{name}": part for name in ("diode", "falling") if (part := values.pop(name)) is not None}
+    lines = [f"\n[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in part.items())
+             for name, part in ({"circuit": values} | tables).items()]  # fmt: skip
+    return "".join(lines)
+
+
 def _read(values: Any) -> Circuit:
     given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
     if isinstance(diode := given.get("diode"), str):

@@ -32,8 +32,8 @@ def _goal(most: float, unit: str) -> Callable[[str], float | None]:
 PERCENT = _goal(100, "%")
 
 ORDER = (
-    "The answer has the fewest wires (rows and columns) of all that meet the goals; of these the fewest LUT4, then the "
-    "fewest bytes per frame, then the errors farthest from their limits."
+    "The answer is the first that meets the goals: fewest wires (rows and columns) first, then domes, light cells and "
+    "light cells with three levels, then the smallest labeller, then the errors farthest from their limits."
 )
 
 
@@ -43,11 +43,10 @@ def add_flags(flag: flags.Flags) -> None:
     flag("SCENES ...", what)
     _goal_flags(flag.group("what the Skin must meet for each of SCENES; none means no limit"))
     _candidate_flags(flag.group("what is tried"))
-    usual = "Number of scenes to choose with (default: the file's, or 500)."
+    usual = "Scenes that check the answer; up to 8 times as many choose it (default: the file's, or 500)."
     flag("--placements N", usual, numbers.whole(2, 1_000_000))
     flag("--threshold X", "Count cells of recordings above this as pressed; needed for numbers.", numbers.CELL)
     flag("--seed N", "Seed of the places (default: the file's, or 0).", numbers.SEED)
-    flag("--quick", "Do not check which of the refused Skins with as many wires are cheaper.")
     flags.workers(flag)
     flags.output(flag, "Write the Skin to this TOML file.")
     flags.json(flag)
@@ -72,15 +71,17 @@ def _candidate_flags(tried: flags.Flags) -> None:
     fixed = "Skin that gives all settings but pitch, labeller, scan, and, where it has none, cover: these are chosen."
     tried("--skin FILE", fixed)
     tried("--pitch-mm MM ...", "Try only this pitch; can be repeated.", numbers.PITCH_MM)
-    cover = "Try only this cover: bare, paper, caps or tiles; can be repeated (default: caps and tiles)."
+    cover = "Try only this cover: bare, paper, caps, tiles or light; can be repeated (default: caps, tiles, light)."
     tried("--cover NAME ...", cover)
     dome = "Try only this closing force of the switches under caps and tiles; can be repeated (default: 0.15 to 1 N)."
     tried("--dome-n N ...", dome, numbers.number(0.001, 1000, "N"))
     tried("--foam-mm MM", "Thickness of the foam on caps and tiles.", numbers.number(0.01, 1000, "mm"), 2.0)
-    tried("--labeller NAME ...", "Try only this labeller, cells, or module:attribute of your own; can be repeated.")
+    by = "Try only this labeller, cells, levels, or module:attribute of your own; can be repeated."
+    tried("--labeller NAME ...", by)
     tried("--scan NAME ...", "Try only this scan; can be repeated (default: all that the Skin's columns can have).")
     tried("--baud N ...", "Try this baud rate; can be repeated (default: the Skin's).", numbers.BAUD)
-    tried("--host-us US", "Accept bitmaps too: the host finds their zones in this time.", numbers.number(0, 1e9, "us"))
+    host = "Time in which the host finds the zones of a map; with it, bitmaps of domes are tried, too."
+    tried("--host-us US", host, numbers.number(0, 1e9, "us"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -129,15 +130,15 @@ def asked(args: argparse.Namespace) -> tuple[FitTask, list[Candidate]]:
         base or Skin(),
         candidates.pitches_for(base, sources, args.pitch_mm),
         candidates.size_for(base, sources),
-        _methods(args.labeller),
+        _methods(args.labeller, args.host_us is not None),
         [scans.find(name).name for name in args.scan] if args.scan else None,
         args.baud,
         covers,
         _protection(args),
     )
     for one in sources:
-        goals.check_count(one.most(count), any(feels(each.cover) for each in tried))
-    return FitTask(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick), tried
+        goals.check_count(min(count, one.most(count)), any(feels(each.cover) for each in tried))
+    return FitTask(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us), tried
 
 
 def _protection(args: argparse.Namespace) -> Protection | None:
@@ -158,20 +159,17 @@ def _covers(args: argparse.Namespace, recorded: bool) -> Faces:
         if args.cover or args.dome_n:
             raise ValueError(f"{args.skin} has a cover, and --cover or --dome-n asks for others; leave one of them out")
         return faces.own(cover)
-    names = flags.known("--cover", args.cover, list(covers.COVERS)) if args.cover else faces.KINDS
+    names = flags.known("--cover", args.cover, [*covers.COVERS, faces.LIGHT]) if args.cover else faces.KINDS
     return faces.BARE if recorded else faces.faces(names, args.dome_n or faces.DOMES_N, args.foam_mm)
 
 
-def _methods(names: list[str] | None) -> list[dict[str, Any]]:
-    from contactfpga_sim.apps.fit.candidates import METHODS, by
+def _methods(names: list[str] | None, bitmaps: bool) -> list[dict[str, Any]]:
+    from contactfpga_sim.apps.fit.candidates import LEVELS, METHODS, ON_HOST, by
 
     if not names:
-        return list(METHODS)
-    return [
-        method
-        for name in dict.fromkeys(names)
-        for method in ([{"report": "cells"}] if name == "cells" else by(labellers.find(name)))
-    ]
+        return [ON_HOST] * bitmaps + [*METHODS]
+    maps: dict[str, list[dict[str, Any]]] = {"cells": [ON_HOST], "levels": [LEVELS]}
+    return [method for name in dict.fromkeys(names) for method in maps.get(name) or by(labellers.find(name))]
 
 
 def _share(percent: float | None) -> float | None:

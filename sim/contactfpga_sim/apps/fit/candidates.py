@@ -12,6 +12,7 @@ from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.choices.scans import SCANS
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin, SkinError
+from contactfpga_sim.apps import light
 from contactfpga_sim.apps.fit.faces import BARE, Faces, Protection, refusal
 from contactfpga_sim.apps.fit.sources import RecordingSource, Size, Source
 
@@ -22,8 +23,13 @@ def by(labeller: Labeller) -> list[dict[str, Any]]:
     return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
 
 
-METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
-"""Methods to try. On-board division costs more LUT4 and saves only microseconds per zone."""
+ON_HOST: dict[str, Any] = {"report": "cells"}
+
+LEVELS: dict[str, Any] = ON_HOST | {"levels": 3, "connectivity": 4}
+"""Three levels of light cells, from which the host finds the contacts."""
+
+METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), LEVELS)
+"""Methods to try, the smallest first. On-board division costs more LUT4 and saves only microseconds per zone."""
 
 COARSEST_MM, FINEST_MM = 32.0, 4.0
 """Range of pitches, by whole columns."""
@@ -41,6 +47,19 @@ class Candidate:
     skin: Skin | None
     refusal: str = ""
     cover: Cover | None = None
+    rank: tuple[int, ...] = ()
+    """Order among sheets with as many wires: domes, light cells and several levels; then methods, scans and baud rates
+    as asked."""
+
+    @property
+    def wires(self) -> int:
+        """Rows and columns."""
+        settings = dict(self.settings)
+        return int(settings["rows"] + settings["columns"])
+
+    @property
+    def cost(self) -> tuple[int, ...]:
+        return (self.wires, *self.rank)
 
 
 def candidates(
@@ -68,9 +87,14 @@ def candidates(
         if protection and not wide:
             wide = protection.refusal(made, at)
             hard.append(wide)
-        for method, scan, baud in itertools.product(methods, scans, bauds or (base.baud,)):
-            one = _candidate(base, sheet | named | method | {"scan": scan, "baud": baud}, made, wide)
-            found[one.settings] = one
+        ways = itertools.product(enumerate(methods), enumerate(scans), enumerate(bauds or (base.baud,)))
+        for (rank, method), (scan_rank, scan), (baud_rank, baud) in ways:
+            if "levels" in method and not (made and made.cell):
+                continue
+            settings = sheet | named | method | {"scan": scan, "baud": baud}
+            one = _candidate(base, settings, made, wide)
+            kind = bool(made and made.cell) + ("levels" in method)
+            found[one.settings] = dataclasses.replace(one, rank=(kind, rank, scan_rank, baud_rank))
     if hard and all(hard):
         raise ValueError(
             f"no cover protects; the last one gives {hard[-1]}: take thicker foam with --foam-mm or a cover with a bed"
@@ -92,11 +116,14 @@ def _candidate(base: Skin, settings: dict[str, Any], cover: Cover | None, wide: 
     key = tuple(sorted(settings.items()))
     if wide:
         return Candidate(key, None, f"Cover refuses: {wide}", cover)
-    changes = {name: value for name, value in settings.items() if name != "cover"}
+    changes = {name: value for name, value in settings.items() if name not in ("cover", "levels")}
     if (base.rows, base.columns) != (settings["rows"], settings["columns"]):
         changes["mask"] = ()  # it tells switches of the other sheet
     try:
-        return Candidate(key, base.replace(**changes), "", cover)
+        skin = base.replace(**changes)
+        if cover and cover.cell and not base.ruler:
+            skin = light.with_cells(skin, cover, settings.get("levels", 1))
+        return Candidate(key, skin, "", cover)
     except SkinError as error:
         return Candidate(key, None, f"Skin refuses: {error}", cover)
 

@@ -12,12 +12,18 @@ import numpy as np
 from contactfpga.design.cover import BODIES, Cells, Cover, CoverError, Ellipse, Load, cells_of
 from contactfpga.design.cover.stopping import peak_forces
 from contactfpga.design.cover.task import Task
-from contactfpga_sim.apps import covers
+from contactfpga_sim.apps import covers, light
+from contactfpga_sim.apps.light import Reading, Sensed
 
-KINDS = ("caps", "tiles")
-"""Keys of :data:`contactfpga_sim.apps.covers.COVERS` that work with any switch."""
+LIGHT = "light"
+"""Light cells under tiles."""
+
+KINDS = ("caps", "tiles", LIGHT)
+"""Kinds that work with switches, or light cells, of any force."""
 
 DOMES_N = (0.15, 0.25, 0.4, 0.6, 1.0)
+LIGHTEST_N = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4)
+"""Forces of the lightest level, half an octave apart."""
 
 Faces = dict[str, Callable[[float], Cover | None]]
 """Covers by name, as functions of pitch in mm; None: no cover."""
@@ -26,21 +32,22 @@ BARE: Faces = {"bare": covers.bare}
 
 
 def faces(kinds: Sequence[str] = KINDS, domes_n: Sequence[float] = DOMES_N, foam_mm: float = 2.0) -> Faces:
-    """Each kind; caps and tiles with each switch, under foam of this thickness."""
+    """Each kind, with each switch or lightest level, under foam of this thickness."""
     found: Faces = {}
     for kind in kinds:
         if kind not in KINDS:
             found[kind] = covers.COVERS[kind]
             continue
-        for force_n in domes_n:
-            found[f"{kind}, {force_n:g} N"] = functools.partial(_on_domes, kind, force_n, foam_mm)
+        for force_n in LIGHTEST_N if kind == LIGHT else domes_n:
+            found[f"{kind}, {force_n:g} N"] = functools.partial(_on_cells, kind, force_n, foam_mm)
     return found
 
 
-def _on_domes(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cover:
-    make = {"caps": covers.capped, "tiles": covers.tiled}[kind]
-    cover = make(pitch_mm, dataclasses.replace(covers.DOME, force_n=force_n))
-    return dataclasses.replace(cover, thickness_m=foam_mm * 1e-3)
+def _on_cells(kind: str, force_n: float, foam_mm: float, pitch_mm: float) -> Cover:
+    make = covers.capped if kind == "caps" else covers.tiled
+    cell = dataclasses.replace(light.example()[2], level_n=force_n) if kind == LIGHT else None
+    switch = cell.switch if cell else dataclasses.replace(covers.DOME, force_n=force_n)
+    return dataclasses.replace(make(pitch_mm, switch), cell=cell, thickness_m=foam_mm * 1e-3)
 
 
 def own(cover: Cover) -> Faces:
@@ -94,9 +101,17 @@ LINES = 9
 """Sides of the sheet; touches are on its middle cell."""
 
 
-def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> list[float]:
-    """1 for each of the :data:`TOUCHES` of each number in which a fingertip with ``force_n``, randomly placed and
-    turned, closes no switch, else 0. Closing forces are drawn for each."""
+Touches = list[tuple[np.ndarray, int]]
+"""(rows, columns) forces on cells, and the seed of what differs from sheet to sheet."""
+
+
+def pressing(cover: Cover | None) -> Cover | None:
+    """One cover for all that take the same forces: light cells do at any level."""
+    return dataclasses.replace(cover, cell=light.example()[2]) if cover and cover.cell else cover
+
+
+def touches(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers: Sequence[int]) -> Touches:
+    """:data:`TOUCHES` of each number by a fingertip with ``force_n``, randomly placed and turned."""
     pitch_x, pitch_y = (pitch * 1e-3 for pitch in pitch_mm)
     cells = cells_of(cover, LINES, LINES, pitch_x, pitch_y)
     indentation = cells.indentation([Ellipse(*(size / 2 for size in FINGERTIP_M))], BODIES["finger"])
@@ -105,6 +120,15 @@ def unfelt(cover: Cover, pitch_mm: tuple[float, float], force_n: float, numbers:
         rng = np.random.default_rng([touch, LINES])
         across, down = LINES // 2 + rng.uniform(-0.5, 0.5, 2)
         parts = (tip.placed(across * pitch_x, down * pitch_y, rng.uniform(0, math.pi)) for tip in pressed)
-        closed = cells.forces_n([Load(tuple(parts), force_n)]) >= cells.drawn(int(rng.integers(1 << 32)))
-        found.append(float(not closed.any()))
+        found.append((cells.forces_n([Load(tuple(parts), force_n)]), int(rng.integers(1 << 32))))
     return found
+
+
+def unfelt(cover: Cover, pitch_mm: tuple[float, float], given: Touches) -> list[float]:
+    """1 for each touch that closes no switch, or reaches no level, else 0. Closing forces and gains are drawn for
+    each."""
+    if cover.cell:
+        lightest = Reading((cover.cell.level_n,))
+        return [float(not Sensed(forces, seed).levels(lightest).any()) for forces, seed in given]
+    cells = cells_of(cover, LINES, LINES, *(pitch * 1e-3 for pitch in pitch_mm))
+    return [float(not (forces >= cells.drawn(seed)).any()) for forces, seed in given]

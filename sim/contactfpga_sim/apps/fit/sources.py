@@ -18,7 +18,8 @@ from contactfpga.design.cover import Cover
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import errors
-from contactfpga_sim.apps.errors import Look, look
+from contactfpga_sim.apps.errors import Blob, look
+from contactfpga_sim.apps.light import Sensed
 from contactfpga_sim.model.scenes.contacts import Contact, Value
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
 from contactfpga_sim.model.scenes.file import SceneFile, scene_of
@@ -33,6 +34,12 @@ SECONDS = 1.0
 
 COUNT = 500
 
+DRAWS = 8
+"""Most scenes to choose with, as a multiple of those for the report."""
+
+Look = tuple[np.ndarray | Sensed, list[Blob]]
+"""(rows, columns) bool pressed cells or, of light cells, the forces as they are read; and true contacts."""
+
 Size = tuple[float, float]
 
 
@@ -44,20 +51,14 @@ class Source(abc.ABC):
         return None
 
     def most(self, count: int) -> int:
-        """Available choosing scenes, at most ``count``; the report has as many."""
-        return count
+        """Available choosing scenes, if the report has ``count``. Later numbers are for the report."""
+        return DRAWS * count
 
     @abc.abstractmethod
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[Look]:
-        """Scenes with these numbers, below twice ``count``, on a sheet under a cover; ``base``: the requested Skin."""
-
-    @abc.abstractmethod
-    def cells(
-        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
-    ) -> list[np.ndarray]:
-        """Pressed (R, C) bool cells of these scenes."""
+        """Scenes with these numbers on a sheet under a cover. ``base``: the requested Skin; ``count``: :meth:`most`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,13 +70,14 @@ class SceneSource(Source):
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[Look]:
-        return [look(*self.at(skin, base, number), skin, cover) for number in numbers]
+        return [_look(number, *self.at(skin, base, number), skin, cover) for number in numbers]
 
-    def cells(
-        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
-    ) -> list[np.ndarray]:
-        drawn = (self.at(skin, base, number) for number in numbers)
-        return [scene.pressed(seconds, skin, cover) for scene, seconds in drawn]
+
+def _look(number: int, scene: Scene, seconds: float, skin: Skin, cover: Cover | None) -> Look:
+    if cover is None or cover.cell is None:
+        return look(scene, seconds, skin, cover)
+    on = scene.on_cover(skin, cover)
+    return Sensed(on.forces_n(seconds, skin, cover), scene.drawn, number), errors.contacts(on.truth(seconds, skin))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,15 +157,10 @@ class RecordingSource(Source):
     def looks(
         self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
     ) -> list[Look]:
-        judge = skin.replace(connectivity=base.connectivity)
-        return [(cells, errors.exact_zones(cells, judge)) for cells in self.cells(skin, base, numbers, count)]
-
-    def cells(
-        self, skin: Skin, base: Skin, numbers: Sequence[int], count: int, cover: Cover | None = None
-    ) -> list[np.ndarray]:
-        frames = self.recording.pressed
+        judge, frames = skin.replace(connectivity=base.connectivity), self.recording.pressed
         half = len(frames) // 2
-        return [frames[number // count * half + number % count * half // count] for number in numbers]
+        drawn = (frames[number // count * half + number % count * half // count] for number in numbers)
+        return [(cells, errors.exact_zones(cells, judge)) for cells in drawn]
 
 
 @functools.lru_cache(maxsize=4)
@@ -195,5 +192,5 @@ def source(name: str, seed: int | None = None, threshold: float | None = None) -
 
 
 def default_count(sources: Sequence[Source]) -> int:
-    """Choosing scenes: the most that a file requests."""
+    """Scenes for the report: the most that a file requests."""
     return max((one.says.count for one in sources if isinstance(one, File)), default=COUNT)

@@ -23,9 +23,6 @@ class Measurement:
     """Speed; None if errors are too large."""
 
 
-DOUBT = ": too few scenes to tell"
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Goals:
     """Limits; None: no limit. The upper end of a mean error's 95 % interval must meet it, so that unseen scenes most
@@ -60,7 +57,7 @@ class Goals:
                 need = math.ceil(Z95**2 * (1 - limit) / limit / each)
                 raise ValueError(
                     f"{count} scenes show at best that a share is below {100 * Z95**2 / (of + Z95**2):.3g} %, the "
-                    f"limit of {name} is {100 * limit:.3g} %; take {need} scenes or more"
+                    f"limit of {name} is {100 * limit:.3g} %; give --placements {need} or more"
                 )
 
     def limits(self) -> list[tuple[str, float]]:
@@ -68,31 +65,31 @@ class Goals:
         return [(name, limit) for name, limit in given if limit is not None]
 
     def misses(self, found: Measurement, sure: bool = True) -> list[tuple[float, str]]:
-        """Each missed limit: factor of excess, and measurement. If one is surely missed, undecided limits are
-        omitted. ``sure``: judge errors by the upper ends of their intervals, else by means."""
+        """Each missed limit: factor of excess, and measurement. If one is missed by the mean, those in doubt are
+        omitted. ``sure``: judge errors by the upper ends of their intervals, else by the lower ones."""
         missed = list(self._missed(found, sure))
-        beyond = [one for one in missed if not one[1].endswith(DOUBT)]
-        return beyond or missed
+        return [one[:2] for one in missed if not one[2]] or [one[:2] for one in missed]
 
-    def _missed(self, found: Measurement, sure: bool) -> Iterator[tuple[float, str]]:
+    def _missed(self, found: Measurement, sure: bool) -> Iterator[tuple[float, str, bool]]:
         for name, words, scale, unit in _ERRORS:
             limit, error = getattr(self, name), found.errors.get(name)
             if limit is None or error is None:
                 continue
             if math.isnan(error.mean):
-                yield math.inf, "finds no contact"
+                yield math.inf, "finds no contact", False
                 continue
-            judged = error.high if sure else error.mean
+            judged = error.high if sure else error.low
             if not judged <= limit:
                 what = words.format(_number(scale * error.mean) + unit)
                 ends = f"{_number(scale * error.low)} to {_number(scale * error.high)}"
-                doubt = DOUBT if error.mean <= limit else ""
-                yield judged / limit, f"{what} ({ends}), limit {_number(scale * limit)}{unit}{doubt}"
+                doubt = error.mean <= limit
+                more = "; more --placements may tell" if doubt else ""
+                yield judged / limit, f"{what} ({ends}), limit {_number(scale * limit)}{unit}{more}", doubt
         if found.speed and self.latency_us is not None and not found.speed.worst_us <= self.latency_us:
             worst = found.speed.worst_us
             what = "no touch to time" if math.isnan(worst) else f"latency {worst:.0f} us at worst"
             over = math.inf if math.isnan(worst) else worst / self.latency_us
-            yield over, f"{what}, limit {self.latency_us:.0f} us"
+            yield over, f"{what}, limit {self.latency_us:.0f} us", False
 
     def margin(self, found: Measurement) -> float:
         """Largest ratio of an error's upper end to its limit."""
@@ -135,11 +132,9 @@ class FitTask:
     base: Skin
     goals: Goals
     count: int
-    """Choosing scenes of each source; the report has as many."""
+    """Scenes of each source for the report; at most :data:`DRAWS` times as many choose."""
     host_us: float | None = None
-    """Host time to label a bitmap; None: the host does not."""
-    quick: bool = False
-    """Synthesize only those that meet the goals; do not rank refused ones with as many wires."""
+    """Time in which the host finds the zones of a map."""
     timed: int = TIMED
 
 
@@ -150,8 +145,6 @@ class Trial:
     refusals: tuple[str, ...] = ()
     excess: float = math.inf
     margin: float = math.inf
-    luts: int | None = None
-    """LUT4; None if not computed."""
 
     @property
     def skin(self) -> Skin:
@@ -159,31 +152,26 @@ class Trial:
         return self.candidate.skin
 
     @property
-    def wires(self) -> int:
-        return self.skin.rows + self.skin.columns
+    def cost(self) -> tuple[int, ...]:
+        return self.candidate.cost
 
     @property
     def bytes(self) -> float:
         """Median bytes of a frame, of the source with the longest."""
         return max((one.speed.bytes for one in self.measured if one.speed), default=math.nan)
 
-    @property
-    def cost(self) -> tuple[float, ...]:
-        """Ranking key: wires, LUT4, bytes, errors relative to limits."""
-        return (self.wires, math.inf if self.luts is None else self.luts, self.bytes, self.margin)
-
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
     task: FitTask
     answer: Trial | None
-    runner_up: Trial | None
+    luts: int | None
+    """LUT4 of the answer."""
     cheaper: tuple[Trial, ...]
     """Refused cheaper trials, the cheapest first; without an answer, the nearest first."""
-    impossible: tuple[Trial, ...]
-    dearer: int
-    reported: tuple[tuple[Measurement, ...], ...]
-    """Answer and runner-up, or the nearest, on scenes not used to choose."""
+    impossible: tuple[Candidate, ...]
+    reported: tuple[Measurement, ...]
+    """Answer, or the nearest, by source on scenes not used to choose."""
     broken: tuple[str, ...]
     """Limits that the answer misses there."""
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from contactfpga.design import kits
-from contactfpga.design.cover import load_cover
+from contactfpga.design.cover import Cover, load_cover
 from contactfpga.design.kits import Kit
 from contactfpga.skin import Skin
+from contactfpga_sim.apps import light
 from contactfpga_sim.apps.latency import stages
 from contactfpga_sim.apps.latency.spread import MixedTimes
 from contactfpga_sim.apps.latency.stages import Finger
@@ -18,7 +20,7 @@ from contactfpga_sim.apps.latency.usb import HOST_S, BridgeSettings, delivered
 from contactfpga_sim.lab.arm import anywhere, places
 from contactfpga_sim.lab.arm.anywhere import WAYS, Found
 from contactfpga_sim.lab.arm.case import Case
-from contactfpga_sim.lab.arm.places import Batch, Latencies
+from contactfpga_sim.lab.arm.places import Batch, Latencies, Peaks
 
 BODIES = ("forearm", "palm", "rigid")
 
@@ -38,29 +40,53 @@ class Collision(NamedTuple):
     speed_m_s: float
 
 
-def fingers() -> list[tuple[Kit, Finger]]:
-    """Each kit with its times from a touch to the host's USB controller."""
-    found = map(kits.kit, kits.names())
-    return [(kit, stages.measure(kit.skin, BridgeSettings(kit.board.bridge), host_touches=0)) for kit in found]
+LIGHT = "starter, light cells"
+"""The starter kit's foam and pads on the cells, and with the times, of the example with levels."""
 
 
-def ways(kit: Kit, finger: Finger) -> tuple[Latencies, ...]:
-    """Latencies of :data:`WAYS`; by UART and pin the kit's, of all touches and phases of its bridge."""
-    touches, hz = finger.board.recorded, kit.skin.clock_hz
+class Worn(NamedTuple):
+    """A sheet on the arm."""
+
+    name: str
+    skin: Skin
+    cover: Cover | None
+    finger: Finger
+    """Its times from a touch to the host's USB controller."""
+
+
+def worn(kit: Kit, finger: Finger) -> Worn:
+    return Worn(kit.name, kit.skin, load_cover(kit.skin_path), finger)
+
+
+def fingers() -> list[Worn]:
+    """The kits, and light cells in the place of a kit's domes."""
+
+    def measured(kit: Kit, skin: Skin) -> Finger:
+        return stages.measure(skin, BridgeSettings(kit.board.bridge), host_touches=0)
+
+    found = [worn(kit, measured(kit, kit.skin)) for kit in map(kits.kit, kits.names())]
+    starter, (skin, _, cell) = kits.kit("starter"), light.example()
+    cover = load_cover(starter.skin_path)
+    assert cover is not None
+    cover = dataclasses.replace(cover, cell=cell, switch=cell.switch)
+    return [*found, Worn(LIGHT, skin, cover, measured(starter, skin))]
+
+
+def ways(skin: Skin, finger: Finger) -> tuple[Latencies, ...]:
+    """Latencies of :data:`WAYS`; by UART and pin the sheet's, of all touches and phases of its bridge."""
+    touches, hz = finger.board.recorded, skin.clock_hz
     usb = MixedTimes.mixed(delivered(finger.settings, hz, one.stream, one.byte) for one in touches)
     pin = np.quantile([one.pin / hz for one in touches], SHARES)
     return (6e-3,), tuple(HOST_S + 1e-6 * usb.quantile(share) for share in SHARES), tuple(pin.tolist()), ()
 
 
 def study(
-    fingers: Iterable[tuple[Kit, Finger]], bodies: tuple[str, ...] = BODIES, times: tuple[int, ...] = (1, 2)
+    fingers: Iterable[Worn], bodies: tuple[str, ...] = BODIES, times: tuple[int, ...] = (1, 2)
 ) -> dict[Collision, list[Batch]]:
     """Batches of touches anywhere, under the kits and the paper's sheets, at these times the case's speed."""
     paper = Case.load("paper")
     known, speed = anywhere.ways(paper, Skin()), paper.link.speed_m_s
-    sheets = [
-        (one.name, paper.wearing(load_cover(one.skin_path)), one.skin, ways(one, finger)) for one, finger in fingers
-    ]
+    sheets = [(one.name, paper.wearing(one.cover), one.skin, ways(one.skin, one.finger)) for one in fingers]
     sheets += [(name, sheet.case(), Skin(), known) for name, sheet in PAPER_SHEETS.items()]
     return {
         Collision(name, body, each * speed): places.batches(
@@ -72,8 +98,19 @@ def study(
     }
 
 
+def depth_text(halves: Sequence[Peaks]) -> str:
+    """Worst and mean depth in mm when the contact arrived; of touches that came to the controller."""
+    depths = 1e3 * np.concatenate([half.detected_m for half in halves])
+    known = depths[~np.isnan(depths)]
+    return f"{known.max():.2f} / {known.mean():.2f}" if len(known) else ""
+
+
+DEPTH = "depth at UART's contact: worst / mean, mm"
+
+
 def lines(found: Mapping[Collision, Found]) -> list[list[str]]:
-    told = [["sheet", "body", "speed, m/s", *(f"{way}: worst / mean, N" for way in WAYS)]]
+    told = [["sheet", "body", "speed, m/s", *(f"{way}: worst / mean, N" for way in WAYS), DEPTH]]
     return told + [
-        [*each[:2], f"{each.speed_m_s:g}", *map(anywhere.peak_text, halves)] for each, halves in found.items()
+        [*each[:2], f"{each.speed_m_s:g}", *map(anywhere.peak_text, halves), depth_text(halves[1])]
+        for each, halves in found.items()
     ]

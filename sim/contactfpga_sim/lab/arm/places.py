@@ -54,6 +54,8 @@ class Peaks:
     indentation_m: Floats
     limited: np.ndarray
     """Whether the torque limit reacted first."""
+    detected_m: Floats
+    """Indentation when the contact arrived at the controller; NaN if it did not."""
 
 
 def check(case: Case) -> None:
@@ -80,25 +82,25 @@ def batches(case: Case, skin: Skin, ways: tuple[Latencies, ...], count: int) -> 
     return [Batch(case, skin, ways, math.ceil(count / len(SEEDS)), seed) for seed in SEEDS]
 
 
-def work(batch: Batch) -> list[list[tuple[float, float, bool]]]:
-    """Peak force in N, peak indentation in m and whether the torque limit reacted first, of each touch for each way.
-    Cached."""
+def work(batch: Batch) -> list[list[tuple[float, float, bool, float]]]:
+    """Peak force in N, peak indentation in m, whether the torque limit reacted first, and indentation at detection, of
+    each touch for each way. Cached."""
     what = dataclasses.asdict(dataclasses.replace(batch, skin=None))  # type: ignore[arg-type]
     key = f"{result_cache.made_by(__name__, batch.skin)} {json.dumps(what, sort_keys=True)}"
-    found: list[list[tuple[float, float, bool]]] = result_cache.cached("places", key, lambda: _touched(batch))
+    found: list[list[tuple[float, float, bool, float]]] = result_cache.cached("places", key, lambda: _touched(batch))
     return found
 
 
-def peaks(found: list[list[list[tuple[float, float, bool]]]], way: int) -> list[Peaks]:
+def peaks(found: list[list[list[tuple[float, float, bool, float]]]], way: int) -> list[Peaks]:
     arrays = [np.array(one[way], float) for one in found]
-    return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0) for array in arrays]
+    return [Peaks(array[:, 0], array[:, 1], array[:, 2] > 0, array[:, 3]) for array in arrays]
 
 
-def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
+def _touched(batch: Batch) -> list[list[tuple[float, float, bool, float]]]:
     case, skin = batch.case, batch.skin
     step = _step_s(case)
     phases = round(case.control.period_s / step)
-    found: list[list[tuple[float, float, bool]]] = [[] for _ in batch.ways]
+    found: list[list[tuple[float, float, bool, float]]] = [[] for _ in batch.ways]
     for x, y, phase, late, column, row in evenly(batch.count, batch.seed).tolist():
         place = {
             "x_mm": _place_mm(x, column, skin.columns, skin.pitch_x_mm),
@@ -114,7 +116,9 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool]]]:
             latency = float(np.quantile(latencies, late)) if latencies else 0.0
             way = "latency" if latencies else "torque"
             outcome = run(moved, way, latency_s=latency, skin=skin, to_peak=True).outcome
-            found[number].append((outcome.peak_force_n, outcome.peak_indentation_m, outcome.reason == "torque"))
+            detected_m = math.nan if outcome.detected_m is None else outcome.detected_m
+            limited = outcome.reason == "torque"
+            found[number].append((outcome.peak_force_n, outcome.peak_indentation_m, limited, detected_m))
     return found
 
 

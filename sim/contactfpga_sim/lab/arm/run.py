@@ -57,6 +57,8 @@ class ArmResponse:
     closes_s: float | None
     detected_s: float | None
     """Arrival of the contact at the controller's input."""
+    detected_m: float | None
+    """Indentation at that time."""
     reacts_s: float | None
     reason: str
     """Reason: ``contact``, ``torque``, ``silence``, or none."""
@@ -190,6 +192,9 @@ def _outcome(world: World) -> ArmResponse:
     return ArmResponse(
         closes_s=float(time[closed[0]]) if len(closed) else None,
         detected_s=world.detected_s,
+        detected_m=None
+        if world.detected_s is None
+        else float(np.interp(world.detected_s, time, course["indentation_m"])),
         reacts_s=reacts,
         reason=reason,
         positive_s=_until_back(course, at),

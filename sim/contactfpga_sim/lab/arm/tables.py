@@ -85,11 +85,11 @@ def places_table(found: ArmRuns) -> writer.Table:
 
 
 def kits_table(found: ArmRuns) -> writer.Table:
-    """The page has the starter kit and the paper's sheet, and neither palms nor a half-space."""
+    """The page has the starter kit with domes and light cells and the paper's sheet, without palms and half-space."""
     head, *rows = kits.lines(found.kits)
 
     def shown(row: Sequence[str]) -> bool:
-        return row[1] != "palm" and row[0] in ("starter", "paper")
+        return row[1] != "palm" and row[0] in ("starter", kits.LIGHT, "paper")
 
     return writer.Table(head, rows, shown)
 

@@ -19,49 +19,9 @@ import numpy as np
 from contactfpga.zones import levels
 from contactfpga_sim.apps import score
 from contactfpga_sim.apps.covers import DOME, sheet
+from contactfpga_sim.apps.light import Reading, Sensed
 from contactfpga_sim.apps.score import MODELS, Archive, Entry, Scores
 from contactfpga_sim.lab.benchmark.scenes import PITCHES_MM, SEED, STEPS, padded
-
-SPREAD = 0.2
-"""Standard deviation of the logarithm of a cell's gain."""
-PRELOAD_N = 0.02
-"""Root mean square of the preload that a glued cover leaves on a cell."""
-CREEP = 0.05
-"""Part of the gain at 1 s that a decade of time adds."""
-TOUCHED, OLDER = (-1.0, 3.0), 3.0
-"""Decades of a touch's time in s; most decades by which a preload is older than the reading at rest."""
-GUARD = 0.8
-"""Part of a level's force from which a cell at rest counts as at that level: then its sample is taken later."""
-
-
-class Reading(NamedTuple):
-    """Forces of the levels, and by how many levels a part must last (:func:`contactfpga.zones.levels.label`)."""
-
-    forces_n: tuple[float, ...]
-    lasts: int = 1
-
-    @property
-    def bits(self) -> int:
-        """Bits of a cell in a map of the levels."""
-        return len(self.forces_n).bit_length()
-
-
-class Sensed:
-    """Forces on the cells of a scene's sheet as they are read, at rest and touched."""
-
-    def __init__(self, forces_n: np.ndarray, *seeds: int):
-        rng = np.random.default_rng(seeds)
-        gain = np.exp(SPREAD * rng.standard_normal(forces_n.shape))
-        preload = PRELOAD_N * np.abs(rng.standard_normal(forces_n.shape))
-        self._rest_n = gain * preload
-        touch, older = 1 + CREEP * rng.uniform(*TOUCHED), 1 + CREEP * rng.uniform(0, OLDER)
-        self._touched_n = gain * (np.maximum(forces_n, 0) * touch + preload * older)
-
-    def levels(self, reading: Reading) -> np.ndarray:
-        """(rows, columns) level of each cell; 0 unless it is above the cell's own level at rest."""
-        forces, read = reading.forces_n, (self._rest_n / GUARD, self._touched_n)
-        rest, touched = (np.searchsorted(forces, one, "right") for one in read)
-        return np.where(touched > rest, touched, 0)
 
 
 def places(read: np.ndarray, pitch_mm: float, lasts: int = 1, weights: np.ndarray | None = None) -> np.ndarray:

@@ -13,12 +13,12 @@ from contactfpga_sim.apps.fit import show
 from contactfpga_sim.apps.fit.search import fit
 from contactfpga_sim.lab import writer
 
-SHOWN = ("too few scenes to tell", "the answer", "runner-up")
+SHOWN = ("--placements may tell", "the answer")
 """Ends of the verdicts that the page shows."""
 
 
 def section(arguments: str) -> writer.Table:
-    """Settings that Skin refuses are left out; the page shows the answer and what more scenes might prefer."""
+    """The page shows the answer and what more scenes might prefer."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
@@ -27,10 +27,9 @@ def section(arguments: str) -> writer.Table:
     with pool.executor(None, None) as executor, pool.progress() as step:
         found = fit(task, tried, executor, step)
     head, checked = show.reported(found)[:2]
-    checked[0] = checked[0].partition(":")[0]
-    names, *rows = show.rows(found, impossible=False)
-    none = f"Skin itself refuses {len(found.impossible)} more settings."
-    after = f"{writer.table_of([head, checked])}\n\n{' '.join((*show.notes(found), none))}"
+    checked[0] = checked[0].partition(",")[0]
+    names, *rows = show.rows(found)
+    after = f"{writer.table_of([head, checked])}\n\n{' '.join(show.notes(found))}"
     columns = [name for name in names if name not in ("pitch mm", "bytes")]
     return writer.Table(names, rows, lambda row: row[-1].endswith(SHOWN), columns, f"    {command}", after)
 

@@ -75,7 +75,7 @@ def headlines(changes: Mapping[str, float], touches: int = TOUCHES, scenes: int 
 def _usual_s() -> places.Latencies:
     """The kit's own times in s from a closed switch to the controller's input, by UART and USB."""
     finger = stages.measure(KIT.skin, BridgeSettings(KIT.board.bridge), host_touches=0)
-    return kits_arm.ways(KIT, finger)[WAYS.index("UART")]
+    return kits_arm.ways(KIT.skin, finger)[WAYS.index("UART")]
 
 
 def _peak_n(cover: Cover, body: str, wide: float, latencies: places.Latencies, touches: int) -> float:

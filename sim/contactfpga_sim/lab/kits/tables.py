@@ -131,7 +131,7 @@ def counts_table() -> str:
 
 
 def _peak_rows(found: list[KitFigures]) -> Iterator[tuple[str, ...]]:
-    study = kits_arm.study([(one.kit, one.finger) for one in found], BODIES, (1,))
+    study = kits_arm.study([kits_arm.worn(one.kit, one.finger) for one in found], BODIES, (1,))
     with pool.executor() as workers:
         peaks = {(each.sheet, each.body): halves for each, halves in anywhere.many(study, workers).items()}
 

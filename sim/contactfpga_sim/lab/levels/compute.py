@@ -17,9 +17,9 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga_sim.apps import pool, result_cache, score
 from contactfpga_sim.apps.covers import sheet
+from contactfpga_sim.apps.light import Reading, Sensed
 from contactfpga_sim.apps.score import MODELS, Entry, Interval, Scores
 from contactfpga_sim.lab.benchmark import entries, scenes
-from contactfpga_sim.lab.benchmark.entries import Reading, Sensed
 from contactfpga_sim.lab.benchmark.pressed import Pressed
 from contactfpga_sim.lab.benchmark.scenes import Work
 
