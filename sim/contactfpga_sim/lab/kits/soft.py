@@ -33,7 +33,7 @@ KITS = ("starter", "soft")
 
 
 def _film_ohm(forces_n: np.ndarray, cell: ResistiveCell, *seeds: int) -> np.ndarray:
-    """Resistances of a film that is drawn, with preload and creep as :class:`contactfpga_sim.apps.light.Sensed` has them."""
+    """Resistances of a drawn film; its preload and creep are as in :class:`contactfpga_sim.apps.light.Sensed`."""
     rng, creep = np.random.default_rng(seeds), cell.creep / cell.exponent
     gain = np.exp(cell.spread / cell.exponent * rng.standard_normal(forces_n.shape))
     preload = cell.preload_n * np.abs(rng.standard_normal(forces_n.shape))
@@ -130,7 +130,9 @@ def leakage_table() -> str:
     ohm = falling.read_ohm(circuit, lines[0], instants_s)
     forces_n = cover.cell.ohm_at_1n / ohm  # its exponent is 1
     cells = [f"{force:.2f} N, {each / 1e3:.3g} kΩ" for force, each in zip(forces_n, ohm, strict=True)]
-    clock = np.sum([np.log2(1 + 1 / (kit.skin.clock_hz * one)) for one in (instants_s, np.full(3, ruler_s))], axis=0)
+    clock = np.sum(
+        [np.log2(1 + 1 / (kit.skin.clock_hz * one)) for one in (instants_s, np.full_like(instants_s, ruler_s))], axis=0
+    )
     rows = [["leakage of a pin", *cells]]
     for leak in LEAKS_UA:
         octaves = falling.error_octaves(circuit, *lines, ohm, leak) + clock
