@@ -89,7 +89,7 @@ def test_zones_with_a_table_of_places_shows_contacts_there(board, tmp_path, run)
     (tmp_path / "touches.rec").write_bytes(b"".join(parts))
     table = Places(10.0, 10.0, 0.0, (Row(1, -1.0, 0.0, 9.0),), (Spread(1.0, 0.0),) * 6)
     (tmp_path / "places.toml").write_text(table.toml())
-    status, out, _ = run("zones", "--places", tmp_path / "places.toml", f"replay://{tmp_path / 'touches.rec'}")
+    status, out, _ = run("zones", "--place-by", tmp_path / "places.toml", f"replay://{tmp_path / 'touches.rec'}")
     assert status == 0
     assert re.search(r"│ +2 │ 200 │ +2.50 │ 30.00 │", out)
 

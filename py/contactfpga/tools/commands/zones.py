@@ -26,7 +26,7 @@ def add_flags(flag: flags.Flags) -> None:
     flags.seconds(flag)
     flags.json(flag, flags.FRAMES)
     flag("--tracks", "Follow contacts: show ids that stay from frame to frame.")
-    flag("--places FILE", "Follow contacts, and place them by this table of `contactfpga cover places`.")
+    flag("--place-by FILE", "Follow contacts, and place them by this table of `contactfpga cover places`.")
     flags.forces(flag, "Show the force at each zone too")
     flag("--record FILE", "Write every byte received to this new file; replay://FILE plays it back.")
 
@@ -52,7 +52,7 @@ class _Follow:
     """Follows contacts over all frames, also those not shown, for ids or forces."""
 
     def __init__(self, args: argparse.Namespace, forces: Forces | None):
-        places = Places.load(args.places) if args.places else None
+        places = Places.load(args.place_by) if args.place_by else None
         self._tracker = Tracker(places=places) if args.tracks or places else None
         self._seconds: float | None = args.seconds
         self.tracks: Tracks | None = None
