@@ -41,7 +41,9 @@ def test_each_sheet_has_its_alive_and_a_pull_at_its_data():
     assert (pins["alive_0"], pins["alive_2"]) == (board.column_side[-1:], board.column_side[-2:-1])
     used = [pin for of_port in pins.values() for pin in of_port]
     assert len(used) == len(set(used)) == 3 * 7 + 2
-    modes = {resource.name: resource.attrs.get("PULLMODE") for resource in SheetsTop(board, several)._resources()}
+    top = SheetsTop(board, several)
+    top._MustUse__silence = True  # nobody elaborates it
+    modes = {resource.name: resource.attrs.get("PULLMODE") for resource in top._resources()}
     assert [modes[f"column_data_{number}"] for number in range(3)] == ["UP", None, "DOWN"]
     assert modes["column_clock_0"] is None
 

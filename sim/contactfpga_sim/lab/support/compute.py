@@ -138,7 +138,7 @@ def extents_of(cells: np.ndarray, pitch_mm: float) -> Zones:
     departures = labelling(cells, skin.connectivity).departures
     moments = np.array([(each.area, each.sum_x, each.sum_y) for each in departures], np.int64).reshape(-1, 3)
     extents = np.array([each.extent for each in departures], np.int64).reshape(-1, 4)
-    frame = Frame(0, 0, frozenset(), 0, 0, len(moments), int(cells.sum()), moments, None, None, extents)
+    frame = Frame(0, 0, frozenset(), 0, 0, len(moments), int(cells.sum()), moments, None, extents=extents)
     return Zones(frame, skin.sheet, 0)
 
 
