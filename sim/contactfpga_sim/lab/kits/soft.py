@@ -103,7 +103,8 @@ def verdict_table() -> writer.Table:
             spans = [judged[name, family][number] for name in KITS]
             row(f"{family} {what}", form, [(scale * one.mean, scale * one.low, scale * one.high) for one in spans])
     row("assembly without parts", "{:.2f} USD", [(SETUP_USD + JOINT_USD * joints(kit),) * 3 for kit in every])
-    return writer.Table(("what", *KITS, "soft is"), rows, lambda row: "off by" not in row[0])
+    even = "edge counted wrong"  # beside eight other rows
+    return writer.Table(("what", *KITS, "soft is"), rows, lambda row: "off by" not in row[0] and row[0] != even)
 
 
 def _felt(kit: Kit) -> dict[str, float]:
