@@ -69,7 +69,7 @@ def test_what_was_done_is_kept(tmp_path):
     (kept,) = (tmp_path / "out").iterdir()
     lines = kept.read_text().splitlines()
     assert "-so-far." in kept.name
-    assert len(lines) > 3
+    assert len(lines) > 1
     assert f"interrupted; {len(lines) - 1} of " in said
 
 
