@@ -84,7 +84,12 @@ static void take_of_sheet(uint8_t byte, int sheet) {
 
 int main(int count, char **words) {
     const contactfpga_stats *stats = &reader.stats;
-    int byte, sheet = count > 1 ? atoi(words[1]) : -1;
+    char *end = NULL;
+    int byte, sheet = count > 1 ? (int)strtol(words[1], &end, 10) : -1;
+    if (count > 1 && (end == words[1] || *end || sheet < 0 || sheet > 15)) {
+        fprintf(stderr, "the sheet is '%s'; it must be a number from 0 to 15\n", words[1]);
+        return 2;
+    }
     contactfpga_init(&reader);
     while ((byte = getchar()) != EOF) {
         if (sheet < 0) take((uint8_t)byte);

@@ -19,8 +19,8 @@ from contactfpga_hdl.board import build
 
 SIMULATED = {"fast.toml", "fast-64x64.toml"}
 """These say so in their first lines."""
-SHEETS = {f"{of}-{sheet}.toml": f"{of}.toml" for of, sheets in {"two-sheets": ("chest", "back"),
-    "arm-sheets": ("forearm", "upper")}.items() for sheet in sheets}  # fmt: skip
+SEVERAL = {"two-sheets": ("chest", "back"), "arm-sheets": ("forearm", "upper")}
+SHEETS = {f"{of}-{sheet}.toml": f"{of}.toml" for of, sheets in SEVERAL.items() for sheet in sheets}
 COMMAND = re.compile(r"^# +contactfpga (build .*)$", re.MULTILINE)
 
 

@@ -313,6 +313,13 @@ def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
     assert by_c(decoder, data) == by_python(data)
 
 
+@pytest.mark.parametrize("word", ["", "x", "1x", "-1", "16"])
+def test_what_is_no_number_of_a_sheet_is_refused(decoder, word):
+    done = subprocess.run([decoder, word], input=b"", capture_output=True, timeout=250, check=False)
+    assert done.returncode == 2
+    assert f"the sheet is '{word}'; it must be a number from 0 to 15" in done.stderr.decode()
+
+
 @pytest.mark.parametrize("number", [0, 1, 15])
 def test_packets_of_one_sheet_are_sorted_from_those_of_all(decoder, rng, number):
     """The driver numbers and sorts the packets of two sheets on a line, with faults and flipped bits."""

@@ -134,8 +134,8 @@ def test_the_answers_file_has_the_cover_that_was_chosen(file, tmp_path, shortcut
     monkeypatch.setattr(search, "CHECKED", 0)
     output = tmp_path / "my.toml"
     text = 'width_mm = 80\nheight_mm = 80\n[[contact]]\nshape = "disc"\nradius_mm = 8\nforce_n = 10\n'
-    options = ["--placements", "100", "--pitch-mm", "16", "--labeller", "single", "--dome-n", "0.25", "--miscounted",
-               "10", "--missed", "10"]  # fmt: skip
+    chosen = "--placements 100 --pitch-mm 16 --labeller single --dome-n 0.25 --miscounted 10 --missed 10"
+    options = chosen.split()
     assert cli.main(["fit", file(text), *options, "--cover", "tiles", "--output", str(output)]) == 0
     cover = load_cover(output)
     assert cover == faces.faces(("tiles",), (0.25,))["tiles, 0.25 N"](16.0)

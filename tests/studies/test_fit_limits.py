@@ -163,9 +163,9 @@ def test_candidates_are_what_was_asked_for(file):
 
 def test_a_skin_that_cannot_be_is_listed_with_its_reason(file, shortcuts):
     found = chosen(file(BUMPER), pitches=(1.0, 20.0))
-    assert all(one.refusal.startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in
-               found.impossible if dict(one.settings)["rows"] == 80)  # fmt: skip
-    assert len([one for one in found.impossible if dict(one.settings)["rows"] == 80]) == len(METHODS) - 1
+    refusals = [one.refusal for one in found.impossible if dict(one.settings)["rows"] == 80]
+    assert all(one.startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in refusals)
+    assert len(refusals) == len(METHODS) - 1
 
 
 def test_sheets_that_differ_are_refused(file):

@@ -12,8 +12,8 @@ from contactfpga_hdl.util.bits import popcount
 def count_levels(m: Module, scanner: wiring.Component, slots: Any, columns: Value, sample: Any) -> Value:
     """The level of each column, as in a row's ``cells``: in how many samples it read pressed.
 
-    ``columns``: levels of the column pins, two clocks late. The lightest level is that of ``sample``, a raster scan's;
-    each other one has a sample of its own, whose ruler is added to ``sample.harder``.
+    ``columns``: levels of the column pins, two clocks late. ``sample``, a raster scan's, reads the
+    lightest level. Each harder level has a sample and a ruler of its own; the ruler is appended to ``sample.harder``.
     """
     skin, derived = scanner.skin, scanner.derived
     read = [sample.read[: skin.columns]]

@@ -10,7 +10,7 @@ from contactfpga_hdl.util.bits import popcount
 
 
 def present(skin: Skin, row: int, bits: int = 1) -> int:
-    """Columns, of so many bits, in which a row has an unmasked switch."""
+    """A word with ``bits`` bits for each column: ones where the row has a switch that is not masked."""
     return sum((1 << bits) - 1 << bits * column for column in range(skin.columns) if (row, column) not in skin.mask)
 
 

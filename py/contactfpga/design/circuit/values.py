@@ -179,8 +179,9 @@ def write_circuit(circuit: Circuit) -> str:
     """The TOML tables that :func:`load_circuit` reads back."""
     values = dataclasses.asdict(circuit)
     tables = {f"circuit.{name}": part for name in ("diode", "falling") if (part := values.pop(name)) is not None}
-    lines = [f"\n[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in part.items())
-             for name, part in ({"circuit": values} | tables).items()]  # fmt: skip
+    lines = []
+    for name, part in ({"circuit": values} | tables).items():
+        lines += [f"\n[{name}]\n", *(f"{key} = {value}\n" for key, value in part.items())]
     return "".join(lines)
 
 

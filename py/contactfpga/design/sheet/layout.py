@@ -243,7 +243,7 @@ class _Matrix:
                 drawing.run(net, "F", (x, y - reach), (x, y + reach))
             return
         node = self.row_net(row) if self.skin.diodes == "none" else f"N{row}_{column}"
-        value = self.switch.part.name if self.switch.part.order else ""  # nobody buys copper
+        value = self.switch.part.name if self.switch.part.order else ""  # combs of copper are no part to order
         drawing.place("SW", self.switch.part, value, (x, y), {"1": net, "2": node}, back=False)
         column_tracks = self.switch.column[: len(self.switch.column) - (self.switch.tail if row == last else 0)]
         for tracks, name in ((column_tracks, net), (self.switch.diode, node)):

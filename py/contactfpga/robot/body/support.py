@@ -173,7 +173,10 @@ def overhang_m(cover: Cover | None, pitch_x_m: float, pitch_y_m: float, firm_pa:
 
 
 def _by_model(cover: Cover, half: Point, hardest_n: float, firm_pa: float) -> Point:
-    """The overhang by the model of the cover, a step of its grid more; more than half a pitch if there is none."""
+    """How far firm contact lies beyond its cells along x and y: by the model of the cover, and one step of its grid.
+
+    More than half a pitch means that firm contact may leave all cells open.
+    """
     cells = Cells(cover, 5, 5, 2 * half[0], 2 * half[1])
 
     def most(axis: int) -> float:

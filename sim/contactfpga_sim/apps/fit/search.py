@@ -91,9 +91,9 @@ class _Race:
                 if False not in verdicts and None in verdicts and look < looks - 1:
                     continue
                 self._left.remove(one)
-                measured = (self._values[source, one] for source in task.sources)
-                trial = _trial(task, one, [Measurement({name: interval(each) for name, each in values.items()})
-                                           for values in measured])  # fmt: skip
+                values = (self._values[source, one] for source in task.sources)
+                measured = [Measurement({name: interval(each) for name, each in of.items()}) for of in values]
+                trial = _trial(task, one, measured)
                 if trial.refusals:
                     self._so_far[one] = trial
                 else:

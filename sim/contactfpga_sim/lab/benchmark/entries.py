@@ -34,7 +34,7 @@ def places(read: np.ndarray, pitch_mm: float, lasts: int = 1, weights: np.ndarra
 # ---- sensors: places from (rows, columns) forces
 
 Sensor = Callable[[np.ndarray, float, tuple[int, ...]], np.ndarray]
-"""Of forces, pitch in mm and seeds."""
+"""Places of contacts from (rows, columns) forces in N, the pitch in mm, and seeds of the sensor's own spread."""
 
 
 def cells(reading: Reading, forces_n: np.ndarray, pitch_mm: float, seeds: tuple[int, ...]) -> np.ndarray:
@@ -47,8 +47,8 @@ def domes(force_n: float, forces_n: np.ndarray, pitch_mm: float, seeds: tuple[in
 
 
 RANGE, FULL_N, NOISE_STEPS, CROSSTALK, GAINS = 255, 10.0, 1.0, 0.01, 0.05
-"""Of an analog array: steps up to a force, noise in steps (rms), share of a force that each of four neighbors reads,
-and spread of the gains."""
+"""The analog array: its steps, the force of the last step in N, noise in steps (rms), the share of a force that each of
+four neighbors reads, and the relative spread of gains."""
 
 
 def analog(forces_n: np.ndarray, pitch_mm: float, seeds: tuple[int, ...]) -> np.ndarray:

@@ -19,10 +19,10 @@ from matplotlib.ticker import NullLocator
 from contactfpga import picture_style as style
 
 WIDTH_IN = 390 / 96
-"""A phone's width, so that nobody has to scroll."""
+"""Width of a phone, where the picture fits."""
 
 KITS = "domes, 6.4 mm"
-"""What both kits are."""
+"""The entry with the design of the starter and the fast kit."""
 
 
 Offset = tuple[float, float]
@@ -138,7 +138,7 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
     marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
     marks += [Line2D([], [], color=style.INK, marker="o", mfc="none", ls="", ms=11)]
-    words = [*ROWS, "below a mark: the mean of all families", "what both kits are"]
+    words = [*ROWS, "below a mark: the mean of all families", "the starter and the fast kit"]
     figure.legend(marks, words, loc="outside lower left", ncols=1)
     return figure
 
