@@ -159,7 +159,7 @@ def test_the_places_of_480_touches_are_as_the_page_says(robot):
     rms = [float(np.sqrt(np.mean(each**2))) for each in (errors, stated)]
     turned = np.degrees(np.arccos(np.minimum(1.0, normals)))
     found = [np.mean(errors), np.quantile(errors, 0.95), errors.max(), *rms, turned.max()]
-    assert found == pytest.approx([3.6, 5.8, 6.8, 3.7, 5.1, 8.5], abs=0.051)
+    assert found == pytest.approx([3.6, 5.7, 6.7, 3.7, 5.1, 8.3], abs=0.051)
 
 
 def test_the_forces_of_units_are_mujocos(robot):

@@ -104,15 +104,15 @@ def _along(far: Callable[[float], float], angle: float, x_mm: float = MIDDLE_MM,
 
 
 def tapping(rng: Random) -> Played:
-    """Three fingers that tap within 12 mm of their places, with bouncing switches; each tap is a new contact."""
-    found = []
-    for home_x, home_y in ((30.0, 40.0), (75.0, 100.0), (120.0, 40.0)):
-        now = rng.uniform(0, 0.2)
-        while now < SECONDS:
-            long = rng.uniform(0.05, 0.3)
-            x, y = home_x + rng.uniform(-12, 12), home_y + rng.uniform(-12, 12)
-            found.append(_finger(x, y, begins_s=now, ends_s=now + long, bounces=True))
-            now += long + rng.uniform(0.03, 0.3)
+    """Four fingers of a hand, 19 to 23 mm apart, that tap in turn, with bouncing switches; each tap is a new contact,
+    and may rest while the next ones tap."""
+    apart, turn, now = rng.uniform(19, 23), rng.uniform(0, 2 * math.pi), rng.uniform(0, 0.1)
+    found: list[Finger] = []
+    while now < SECONDS:
+        along, long = (len(found) % 4 - 1.5) * apart, rng.uniform(0.05, 0.3)
+        x, y = (MIDDLE_MM + along * share + rng.uniform(-2, 2) for share in (math.cos(turn), math.sin(turn)))
+        found.append(_finger(x, y, begins_s=now, ends_s=now + long, bounces=True))
+        now += long * rng.uniform(0.3, 1.2)
     return tuple(found)
 
 

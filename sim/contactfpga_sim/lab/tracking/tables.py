@@ -152,9 +152,6 @@ def reflex_table() -> str:
 
 SCORES = Path("docs/tables/tracking-scores.csv")
 
-SHOWN = tuple(family for family in scenes.FAMILIES if family != "tapping")
-"""Families with a panel; on taps all are alike."""
-
 
 def draw(folder: Path) -> Path:
     import matplotlib
@@ -163,8 +160,8 @@ def draw(folder: Path) -> Path:
         rows = [row for row in csv.DictReader(file) if not row["scenes"].startswith("mean")]
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(5.0)
-        panels = figure.subplots(2, -(-len(SHOWN) // 2), sharex=True, sharey=True)
-        for axes, family in zip(panels.flat, SHOWN):
+        panels = figure.subplots(2, len(scenes.FAMILIES) // 2, sharex=True, sharey=True)
+        for axes, family in zip(panels.flat, scenes.FAMILIES):
             some = [row for row in rows if row["scenes"] == f"`{family}`"]
             rates = [float(row["frames per second"].replace(",", "")) for row in some]
             for tracker, (color, dashes) in LOOKS.items():
@@ -179,8 +176,6 @@ def draw(folder: Path) -> Path:
             axes.tick_params(labelbottom=True)
         for axes in panels[:, 0]:
             axes.set_ylabel("time with one id (IDF1), %")
-        legend = panels.flat[len(SHOWN)]
-        legend.axis("off")
-        legend.legend(*panels[0, 0].get_legend_handles_labels(), loc="center left")
+        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(LOOKS))
         figure.supxlabel("frames per second", fontsize=style.NORMAL)
         return style.save(figure, folder / "tracking.svg")
