@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 # The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
 # source tree that was never installed, and out of date in an editable install made before the last release.
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "AddressError",

@@ -214,7 +214,7 @@ def test_a_touch_takes_mechanics_and_electronics():
 
 
 def test_a_touch_that_closes_nothing_takes_forever():
-    skin, cover = METHODS["run, 10 mm, paper"]
+    skin, cover = METHODS["run, 6.4 mm, paper"]
     light, firm = (
         Scene(
             (contacts.Contact(shape=contacts.disc(6.0), x_mm=60.0, y_mm=40.0, force_n=force, speed_mm_s=100.0),)

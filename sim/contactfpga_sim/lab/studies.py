@@ -42,7 +42,7 @@ _ALL = (
         "chart",
         title="Speed against accuracy",
         page="chart.md",
-        minutes=7,
+        minutes=4.5,
         sections=tables("front families methods host"),
         compute="tables:compute",
         pictures="tables:draw",
