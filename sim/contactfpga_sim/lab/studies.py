@@ -259,13 +259,7 @@ _ALL = (
         ),
         extra="boards",
     ),
-    Study(
-        "sheet",
-        title="The example sheet as its command draws it",
-        page="sheet.md",
-        minutes=0.1,
-        pictures="pictures:draw",
-    ),
+    Study("sheet", title="An example sheet", page="sheet.md", minutes=0.1, pictures="pictures:draw"),
     Study(
         "sizes",
         title="Size and clock by place and route",

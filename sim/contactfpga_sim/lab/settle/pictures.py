@@ -63,12 +63,7 @@ def _row(path: Path) -> Path:
 
 def _breaks(path: Path) -> Path:
     figure = style.new(6.4)
-    figure.suptitle(
-        "A cross and the number in the legend: the first value beyond the limit",
-        x=0.02,
-        ha="left",
-        fontsize=style.NORMAL,
-    )
+    figure.suptitle("Crosses and numbers: the first value beyond the limit", x=0.02, ha="left", fontsize=style.NORMAL)
     for axes, (name, knob) in zip(figure.subplots(2, 2).flat, KNOBS.items()):
         late = name != "coupling"
         limit = SETTLE_US if late else HIGH_V

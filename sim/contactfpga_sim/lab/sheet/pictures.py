@@ -16,7 +16,5 @@ def draw(folder: Path) -> Path:
     """Draw ``examples/tiles.toml``, as its command does."""
     file, path = examples() / "tiles.toml", folder / "sheet.svg"
     skin = Skin.load(file)
-    write_text(
-        path, picture.svg(lay_out(skin, load_checked(file, skin)).drawing, "contactfpga sheet examples/tiles.toml")
-    )
+    write_text(path, picture.svg(lay_out(skin, load_checked(file, skin)).drawing, f"contactfpga sheet {file.name}"))
     return path

@@ -41,9 +41,7 @@ def draw(folder: Path) -> Path:
                 axes.text((left + right) / 2, -lane, words, ha="center", va="center", fontsize=style.SMALL)
 
         numbers = itertools.accumulate(trace.rows, lambda number, row: 0 if row[2] else number + 1, initial=0)
-        for number, (start, cells, _), (end, after, _) in zip(
-            itertools.islice(numbers, 1, None), trace.rows, trace.rows[1:]
-        ):
+        for (_, (start, cells, _)), (number, (end, after, _)) in itertools.pairwise(zip(numbers, trace.rows)):
             box(ROW, start, end, str(number), after)
             box(CELLS, start, end, f"{cells:02x}", cells)
         for at, data, ended in trace.records:
@@ -54,11 +52,8 @@ def draw(folder: Path) -> Path:
         ends = [at for at, byte in trace.bytes if byte == 0]
         for at, byte in trace.bytes:
             box(BYTE, at, at + BYTE_CLOCKS, f"{byte:02x}", ends[-2] < at <= ends[-1])
-        for lane, changes in (
-            (LINE, [(-touch.touched, 1), *trace.line]),
-            (CONTACT, [(-touch.touched, 0), *trace.contact]),
-        ):
-            times, levels = np.array([*changes, (touch.ends, changes[-1][1])]).T
+        for lane, before, changes in ((LINE, 1, trace.line), (CONTACT, 0, trace.contact)):
+            times, levels = np.array([(-touch.touched, before), *changes, (touch.ends, changes[-1][1])]).T
             axes.step(times * us, -lane - 0.3 + 0.6 * levels, where="post", color=style.BLUE, lw=1)
         axes.axvline(0, color=style.VERMILLION, lw=1.4)
         axes.set_xlim(first, last)
