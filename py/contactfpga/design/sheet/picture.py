@@ -21,7 +21,7 @@ from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
 _BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#20262e", "#ffffff", "#6b7a8f"
-_FIRST = "#c0392b"
+_FIRST, _LEADER = "#c0392b", "#8a4fbf"  # the latter is seen on the board and on both cards
 
 
 def svg(drawing: Drawing, title: str) -> str:
@@ -80,7 +80,7 @@ def _enlarged(drawing: Drawing, left: float, middle: float, side: float, size: f
         else:
             across = left + (min(near, key=lambda one: one.y1).x1 - x) * scale
             texts.append((across, top - 0.5 * size, f"column {net[3:]}"))
-    yield f'<path fill="none" stroke="{picture_style.INK}" stroke-width="{size / 12:.2f}" d="{"".join(ways)}"/>'
+    yield f'<path fill="none" stroke="{_LEADER}" stroke-width="{size / 8:.2f}" d="{"".join(ways)}"/>'
     for x, y, words in texts:
         anchor = "start" if x > end else "middle"
         yield f'<text x="{x:.2f}" y="{y:.2f}" text-anchor="{anchor}" {_letters(size)}>{words}</text>'
