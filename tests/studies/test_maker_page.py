@@ -5,8 +5,8 @@ import tomllib
 from pathlib import Path
 
 from contactfpga.boards import find
-from contactfpga.design import buildable
-from contactfpga.design.circuit import load_checked, needed
+from contactfpga.design import buildable, kits
+from contactfpga.design.circuit import load_checked, load_circuit, needed
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.maker import tables
 
@@ -14,12 +14,12 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "maker.md"
 
 
-def test_the_schematic_shows_the_values_of_the_tables():
+def test_the_schematic_shows_the_values_of_the_kit_and_of_the_tables():
     drawn = (DOCS / "images" / "schematic.svg").read_text(encoding="utf-8")
-    circuit = tables.PULLED
-    for ohm in (circuit.column_pull_ohm, circuit.row_pull_ohm):
-        assert f"{ohm / 1000:g} kΩ" in drawn
-    assert f"{circuit.series_ohm:g} Ω" in drawn
+    circuit = load_circuit(kits.kit("starter").skin_path)
+    for ohm in (circuit.column_pull_ohm, tables.PULLED.row_pull_ohm):
+        assert f">{ohm / 1000:g} kΩ<" in drawn
+    assert f">{circuit.series_ohm:g} Ω<" in drawn
 
 
 def test_the_pages_skin_works_with_its_circuit(tmp_path):

@@ -50,7 +50,7 @@ SHOWN = [
     ),
 ]
 DRAWN = [
-    *("scenes", "tracking"),
+    *("scenes", "settle", "sheet", "tracking", "wave"),
     pytest.param("arm", marks=(pytest.mark.campaign, pytest.mark.timeout(7200))),
 ]
 

@@ -259,6 +259,7 @@ _ALL = (
         ),
         extra="boards",
     ),
+    Study("sheet", title="An example sheet", page="sheet.md", minutes=0.1, pictures="pictures:draw"),
     Study(
         "sizes",
         title="Size and clock by place and route",
@@ -308,5 +309,6 @@ _ALL = (
         minutes=0.1,
         sections=tables(units=Section("tables:units_table", sample="tables:units_table")),
     ),
+    Study("wave", title="One touch with its values", page="wave.md", minutes=0.5, pictures="pictures:draw"),
 )
 STUDIES = {study.name: study for study in _ALL}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from contactfpga import picture_style
@@ -20,7 +21,7 @@ from contactfpga.design.sheet.gerber import on_layer
 
 COPPER: dict[Layer, tuple[str, str]] = {"B": ("#3465a4", "back copper"), "F": ("#c0392b", "top copper")}
 _BOARD, _PRINT, _HOLE, _BODY = "#efe9d8", "#20262e", "#ffffff", "#6b7a8f"
-_FIRST = "#c0392b"
+_FIRST, _LEADER = "#c0392b", "#8a4fbf"  # the latter is seen on the board and on both cards
 
 
 def svg(drawing: Drawing, title: str) -> str:
@@ -30,12 +31,14 @@ def svg(drawing: Drawing, title: str) -> str:
 
 def _lines(drawing: Drawing, title: str) -> Iterator[str]:
     left, top, right, bottom = drawing.bounds()
-    edge = (right - left) / 50
-    w, h = right - left + 2 * edge, bottom - top + 4 * edge
+    side = min(right - left, bottom - top) / 2
+    edge = side / 15
+    w, h = right - left + side + 8 * edge, bottom - top + 4 * edge
     yield f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w:.2f} {h:.2f}">'
     yield f"<title>{title}</title>"
     yield f'<path fill="{picture_style.CARD}" d="{_box(0, 0, w, h)}"/>'
     yield f'<g transform="translate({edge - left:.3f} {edge - top:.3f})">'
+    yield '<g id="board">'
     yield f'<path fill="{_BOARD}" stroke="#888" stroke-width="0.2" d="{_edge(drawing)}"/>'
     yield '<g fill="none" stroke-linecap="round">'
     for layer, (color, _) in COPPER.items():
@@ -44,9 +47,57 @@ def _lines(drawing: Drawing, title: str) -> Iterator[str]:
     yield f'<path stroke="{_BODY}" stroke-width="0.1" d="{bodies}"/>'
     yield _printed(drawing, "F")
     yield from _dots(_holes(drawing), _HOLE)
-    yield "</g>"
+    yield "</g></g>"
+    yield from _enlarged(drawing, right + edge, (top + bottom) / 2, side, edge)
     yield from _legend(left, bottom + 1.7 * edge, edge)
     yield "</g></svg>"
+
+
+def _enlarged(drawing: Drawing, left: float, middle: float, side: float, size: float) -> Iterator[str]:
+    """The cell in the middle of the sheet, in a square with that left edge and middle, and the names of what it has."""
+    x, y, right, bottom = drawing.bounds()
+    switches = [one for one in drawing.placed if one.reference.startswith("SW")]
+    switch = min(switches, key=lambda one: math.hypot(2 * one.x - x - right, 2 * one.y - y - bottom))
+    reach = 0.75 * max(switch.part.width, switch.part.height)
+    x, y, scale, end = switch.x - reach, switch.y - reach, side / (2 * reach), left + side
+    top = middle - side / 2
+    yield f'<svg x="{left:.2f}" y="{top:.2f}" width="{side:.2f}" height="{side:.2f}" '
+    yield f'viewBox="{x:.3f} {y:.3f} {2 * reach:.3f} {2 * reach:.3f}"><use href="#board"/></svg>'
+    here = [one for one in drawing.placed if one is switch or set(one.nets.values()) & _between(switch)]
+    lines = {net for one in here for net in one.nets.values()} - _between(switch)
+    ways = [f"M{left:.2f} {top:.2f}h{side:.2f}v{side:.2f}h{-side:.2f}z", _box(x, y, 2 * reach, 2 * reach)]
+    texts = []
+    for one in here:
+        at = one.y - 0.3 * one.part.height if one is switch else one.y
+        height = top + (at - y) * scale
+        ways.append(f"M{left + (one.x + 0.4 * one.part.width - x) * scale:.2f} {height:.2f}H{end + 0.4 * size:.2f}")
+        texts.append((end + 0.6 * size, height + 0.35 * size, "switch" if one is switch else "diode"))
+    for net in sorted(lines):
+        near = [t for t in drawing.tracks if t.net == net and _meets(t, x, y, 2 * reach)]
+        if net.startswith("ROW"):
+            height = top + (min(near, key=lambda one: one.x1).y1 - y) * scale
+            texts.append((end + 0.6 * size, height + 0.35 * size, f"row {net[3:]}"))
+        else:
+            across = left + (min(near, key=lambda one: one.y1).x1 - x) * scale
+            texts.append((across, top - 0.5 * size, f"column {net[3:]}"))
+    yield f'<path fill="none" stroke="{_LEADER}" stroke-width="{size / 8:.2f}" d="{"".join(ways)}"/>'
+    for x, y, words in texts:
+        anchor = "start" if x > end else "middle"
+        yield f'<text x="{x:.2f}" y="{y:.2f}" text-anchor="{anchor}" {_letters(size)}>{words}</text>'
+
+
+def _between(switch: PlacedPart) -> set[str]:
+    """The net between a switch and its diode; none without diodes."""
+    return {net for net in switch.nets.values() if net.startswith("N")}
+
+
+def _meets(track: CopperTrack, x: float, y: float, side: float) -> bool:
+    (x1, x2), (y1, y2) = sorted((track.x1, track.x2)), sorted((track.y1, track.y2))
+    return x1 < x + side and x2 > x and y1 < y + side and y2 > y
+
+
+def _letters(size: float) -> str:
+    return f'font-family="sans-serif" font-size="{size:.2f}" fill="{picture_style.INK}"'
 
 
 def assembly(drawing: Drawing, title: str) -> str:
@@ -162,5 +213,4 @@ def _legend(left: float, y: float, size: float) -> Iterator[str]:
     for number, (color, said) in enumerate(words):
         x = left + number * 9 * size
         yield f'<path fill="{color}" d="{_box(x, y - 0.75 * size, size, 0.75 * size)}"/>'
-        style = f'font-family="sans-serif" font-size="{size:.2f}" fill="{picture_style.INK}"'
-        yield f'<text x="{x + 1.4 * size:.2f}" y="{y:.2f}" {style}>{said}</text>'
+        yield f'<text x="{x + 1.4 * size:.2f}" y="{y:.2f}" {_letters(size)}>{said}</text>'

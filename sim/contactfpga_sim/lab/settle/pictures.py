@@ -63,25 +63,17 @@ def _row(path: Path) -> Path:
 
 def _breaks(path: Path) -> Path:
     figure = style.new(6.4)
-    figure.suptitle("A cross is the first value beyond the limit", x=0.02, ha="left", fontsize=style.NORMAL)
+    figure.suptitle("Crosses and numbers: the first value beyond the limit", x=0.02, ha="left", fontsize=style.NORMAL)
     for axes, (name, knob) in zip(figure.subplots(2, 2).flat, KNOBS.items()):
         late = name != "coupling"
         limit = SETTLE_US if late else HIGH_V
         for color, (run, sweep) in zip(COLORS, breaks.sweeps(name).items()):
             amounts = [outcome.amount for outcome in sweep.outcomes]
             shown = np.where(np.isfinite(amounts), amounts, np.nan)
-            axes.plot(knob.values, shown, color=color, lw=1.8, label=run)
             if sweep.broken is not None:
                 axes.plot([sweep.breaks_at], [amounts[sweep.broken]], "x", color=color, ms=7, mew=2)
-                axes.annotate(
-                    f"{float(f'{sweep.breaks_at:.2g}'):,g}",
-                    (sweep.breaks_at, amounts[sweep.broken]),
-                    (6, -17) if late else (6, 7),
-                    textcoords="offset points",
-                    fontsize=style.SMALL,
-                    bbox={"facecolor": style.CARD, "edgecolor": "none", "pad": 1},
-                    zorder=5,
-                )
+                run += f": {float(f'{sweep.breaks_at:.2g}'):,g}"
+            axes.plot(knob.values, shown, color=color, lw=1.8, label=run)
         words = f"limit, settle_us = {limit:g} µs" if late else f"limit, VIH = {limit:.1f} V"
         axes.axhline(limit, color=style.INK, lw=1, ls=style.DASHES[1], label=words)
         if name != "columns":

@@ -1,0 +1,1 @@
+"""The sheet of docs/sheet.md, as its command draws it."""

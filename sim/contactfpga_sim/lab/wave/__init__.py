@@ -1,0 +1,1 @@
+"""One touch of docs/wave.md, with its values."""
