@@ -281,6 +281,13 @@ def test_a_rehearsal_of_a_kit_writes_its_report(tmp_path, run):
     assert (grade["name"], grade["as_predicted"]) == ("settle_us", True)
 
 
+@pytest.mark.parametrize("rehearsed", [True, False])
+def test_only_the_report_of_a_real_sheet_is_asked_for(rehearsed, capsys):
+    kit = kits.kit("starter")
+    bringup._show_end(report.BringUpReport(kit, kit.skin, datetime.date(2026, 1, 1)), "report.md", rehearsed)
+    assert ("open an issue" in capsys.readouterr().out) != rehearsed
+
+
 @pytest.mark.slow
 def test_weights_on_a_film_give_its_law_and_each_cells_factor_and_name_a_dead_and_a_shorted_cell():
     """Factors, law and faults are drawn here, and replace those of the virtual board."""

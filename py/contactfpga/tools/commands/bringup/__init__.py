@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     write_text(path, report.to_markdown())
     if report.film is not None:
         write_text(path.with_suffix(".csv"), report.film.csv())
-    results.show(args, report, lambda: _show_end(report, str(path)))
+    results.show(args, report, lambda: _show_end(report, str(path), args.port == REHEARSAL))
     return min(report.faults, 1)
 
 
@@ -241,7 +241,7 @@ def _add(args: argparse.Namespace, report: BringUpReport, step: Step, port: str)
     report.steps.append(Step(step.name, plain, step.measured, step.stop))
 
 
-def _show_end(report: BringUpReport, path: str) -> None:
+def _show_end(report: BringUpReport, path: str, rehearsed: bool) -> None:
     for one in report.grades:
         said = one.prediction
         measured = f"{said.name} = {one.measured:.4g} {said.unit}, predicted {said.low:g} to {said.high:g}"
@@ -249,4 +249,5 @@ def _show_end(report: BringUpReport, path: str) -> None:
     for what in report.left_out:
         terminal.say(f"note  left out: {what}", hang=6)
     faults = f"{report.faults} fault{'' if report.faults == 1 else 's'}"
-    terminal.say(f"{faults}; the report is {path}: open an issue with it, whatever it says", hang=2)
+    then = "a rehearsal, which nobody needs to see" if rehearsed else "open an issue with it, whatever it says"
+    terminal.say(f"{faults}; the report is {path}: {then}", hang=2)
