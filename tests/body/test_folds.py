@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import re
 
 import numpy as np
 import pytest
@@ -75,7 +77,7 @@ def test_without_the_angle_nothing_is_marked(robot):
     ("change", "says"),
     [
         ({"lines": [4, 600]}, "lines is [4, 600]; it must be rows and columns, 64 at most"),
-        ({"steps": [{"step": 0, "frames": 1, "cells": [[4, 0]]}]}, "a cell is [4, 0]; the sheet has 4x6"),
+        ({"steps": [{"step": 0, "frames": 1, "cells": [[4, 0, 1]]}]}, "a cell is [4, 0, 1]; the sheet has 4x6"),
         ({"steps": 7}, "not a file of `contactfpga body learn`"),
         ({"lines": [4, 5]}, "folds are of (4, 5) cells; the Skin has (4, 6)"),
     ],
@@ -147,10 +149,135 @@ class Sweeping(DirectPort):
         super().__init__(SKIN)
 
 
+# ---- boards that tell levels of force
+
+LEVELS = SKIN.replace(
+    **{
+        name: getattr(contactfpga.Skin.load(contactfpga.examples() / "levels.toml"), name)
+        for name in (
+            "row_drive",
+            "guard",
+            "ruler",
+            "harder",
+            "precharge_us",
+            "release_us",
+            "settle_us",
+        )
+    }
+)
+
+
+def frame_of(levels, skin=LEVELS):
+    cells, told = levels > 0, levels if skin.levels > 1 else None
+    return Zones(
+        Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, told), skin.sheet, 0
+    )
+
+
+def explains(history, angle, step_rad, row, column, level, levels):
+    """Whether some frame of the history explains a cell's level at an angle, cell by cell and frame by frame."""
+    for before, seen in history:
+        apart = abs(math.floor(before / step_rad) - math.floor(angle / step_rad))
+        if apart == 0 and seen[row, column] >= level:
+            return True
+        if levels > 1 and apart <= 1:
+            near = seen[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2]
+            if seen[row, column] >= level or (level == 1 and near.any()):
+                return True
+    return False
+
+
+@pytest.mark.parametrize("skin", [SKIN, LEVELS], ids=["one level", "three levels"])
+def test_random_histories(skin, rng, tmp_path):
+    shape, step_rad, shares = (skin.rows, skin.columns), 0.25, []
+    for _ in range(40):
+        draw = np.random.default_rng(rng.getrandbits(32))
+        drawn = [draw.integers(0, skin.levels + 1, shape) * (draw.random(shape) < 0.3) for _ in range(9)]
+        history = [(float(draw.uniform(-1, 1)), one) for one in drawn]
+        learn("elbow", [(angle, frame_of(one, skin)) for angle, one in history], step_rad).save(tmp_path / "f.json")
+        known = Folds.load(tmp_path / "f.json")
+        for angle in draw.uniform(-1.2, 1.2, 12).tolist():
+            zone = draw.integers(0, skin.levels + 1, shape) * (draw.random(shape) < 0.4)
+            learned = any(math.floor(one / step_rad) == math.floor(angle / step_rad) for one, _ in history)
+            cells = [(*cell, zone[cell], skin.levels) for cell in zip(*np.nonzero(zone))]
+            counted = [explains(history, angle, step_rad, *cell) for cell in cells]
+            expected = sum(counted) / len(counted) if counted and learned else None
+            assert known.share(angle, zone) == pytest.approx(expected)
+            shares.append(expected)
+    assert None in shares
+    assert len({*shares}) > 20
+
+
+def test_harder_than_the_fold_is_a_touch(robot):
+    """In one contact with the fold, whose cells none but the level tells from it."""
+    (robot.parent / "skin.toml").write_text(LEVELS.to_toml())
+    crease = np.array([[0, 1, 2, 2, 1, 0]] * 2 + [[0] * 6] * 2)
+    learn("elbow", [(0.15, frame_of(crease))], 0.1).save(robot.parent / "folds.json")
+    touched = crease.copy()
+    touched[1, 2] = 3
+    for levels, expected in ((crease, 1.0), (touched, 7 / 8)):
+        (only,) = snapshot(robot, frame_of(levels), lambda _: {"elbow": 0.15}).contacts("link")
+        assert only.fold == expected
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"version": 1, "steps": [{"step": 0, "frames": 1, "cells": [[0, 1]]}]}, "folds have 1 of the Skin's 3 levels"),
+        ({"version": 3}, "its version is 3; this contactfpga reads up to 2"),
+        ({"levels": 4}, "levels is 4; it must be a whole number from 1 to 3"),
+        ({"steps": [{"step": 0, "frames": 1, "cells": [[0, 1, 4]]}]}, "[0, 1, 4], whose last number is its level"),
+    ],
+)
+def test_files_of_other_versions_and_levels(robot, change, says):
+    (robot.parent / "skin.toml").write_text(LEVELS.to_toml())
+    path = robot.parent / "folds.json"
+    learn("elbow", [(0.15, frame_of(np.ones((4, 6), int)))], 0.1).save(path)
+    Body.load(robot)
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(BodyError, match=re.escape(says)):
+        Body.load(robot)
+
+
+def test_a_file_without_a_version_has_cells_of_one_level(robot):
+    file = robot.parent / "folds.json"
+    steps = [{"step": 1, "frames": 2, "cells": [[0, 1], [0, 2]]}]
+    file.write_text(json.dumps({"joint": "elbow", "step_rad": 0.1, "lines": [4, 6], "steps": steps}))
+    (only,) = snapshot(robot, frame(*CREASE), lambda _: {"elbow": 0.15}).contacts("link")
+    assert only.fold == pytest.approx(2 / 3)
+
+
+@pytest.mark.slow
+def test_command_learns_levels_of_a_virtual_board_with_a_margin(tmp_path, monkeypatch):
+    """Under a palm: each level from two thirds of its force on; the samples are as the Skin says again in the end."""
+    file = contactfpga.examples() / "levels.toml"
+    (tmp_path / "robot.toml").write_text(
+        f'[[links]]\nname = "arm"\nskin = "{file}"\nport = "sim://?scene=palm&skin={file}"\n'
+        "late_s = 60.0\nsilent_s = 90.0\n"
+    )
+    asked, usual = [], contactfpga.Board.sample_at
+
+    def sample_at(board, clocks=0, timeout=60.0, *, level=1):
+        asked.append((level, clocks))
+        return usual(board, clocks, 60.0, level=level)
+
+    monkeypatch.setattr(contactfpga.Board, "sample_at", sample_at)
+    monkeypatch.setattr("sys.stdin", io.StringIO("0.05\n0.06\n"))
+    output = tmp_path / "folds.json"
+    assert cli.main(["body", "learn", str(tmp_path / "robot.toml"), "arm", "elbow", str(output)]) == 0
+    assert asked == [(2, 36), (3, 9), (1, 0), (2, 0), (3, 0)]
+    (learned,) = Folds.load(output).reached.values()
+    with contactfpga.open(f"sim://?scene=palm&skin={file}", timeout=60.0) as board:
+        read = board.read(60.0).levels
+    assert (learned >= read).all()
+    assert (learned > 0).sum() == (read > 0).sum()
+    assert (learned == 2).sum() > 1.2 * (read == 2).sum()
+
+
 def test_rates_in_simulation():
-    """Few fingers pass for a crease, unless it hides them; nothing is marked where nothing folds."""
-    found = folding.rates(2, count=150)
-    assert found.folds > 0.95
-    assert found.joined < 0.15
-    assert found.within > 0.9
-    assert (found.apart, found.straight) == (0, 0)
+    """Three levels find most touches in a fold that one level cannot tell from it, and no fold passes for a touch."""
+    file = contactfpga.examples() / "kits" / "soft" / "skin.toml"
+    one, three = (folding.found(file, levels, 0.5, folds=100, touches=200) for levels in (1, 3))
+    assert sum(three.folds) <= 1 < 20 < sum(one.folds)
+    assert np.mean(three.within) > 0.5 > 0.2 > np.mean(one.within)
+    assert np.mean(three.joined) > 0.95 > np.mean(one.joined)

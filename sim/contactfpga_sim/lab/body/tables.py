@@ -14,7 +14,9 @@ from contactfpga.robot.body import BodyError, registration
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan, read
 from contactfpga.robot.body.registration import Press
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin
+from contactfpga_sim.apps.score import wilson
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.body import folding, outages
 from contactfpga_sim.model.scenes import contacts
@@ -90,7 +92,15 @@ def _errors(true: Plan, found: Pose, rms_mm: float) -> tuple[float, float, float
 
 POINTS = (3, 4, 6, 10)
 SHOWN = (3, 6)
-SWEEPS = (1, 2, 5, 10)
+FOLDS_N = (2.0, 1.0, 0.5)
+"""Force of a fold on the cell that it presses most."""
+BOARDS = {
+    "soft kit, one level": ("kits/soft/skin.toml", 1),
+    "soft kit": ("kits/soft/skin.toml", 3),
+    "`levels.toml`": ("levels.toml", 3),
+}
+"""Skin and its levels."""
+NOT_SHOWN = "soft kit, one level", "1 N"
 
 
 def outages_table() -> str:
@@ -126,17 +136,28 @@ def registration_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row in shown, columns)
 
 
-def folds_table() -> str:
-    head = ("times over the range", "folds, %", "touches apart from the fold, %", "touches joined with it, %")
-    rows: list[tuple[str, ...]] = [(*head, "touches within it, %", "touches, joint straight, %")]
-    return writer.table_of([*rows, *map(_folds, SWEEPS)])
+def folds_table() -> writer.Table:
+    head = (
+        "board",
+        "a fold presses",
+        "folds taken for a touch",
+        "touches within it found",
+        "touches over its edge found",
+    )
+    rows = [_folds(board, most_n) for most_n in FOLDS_N for board in BOARDS]
+    return writer.Table(head, rows, lambda row: (row[0], row[1]) != NOT_SHOWN)
 
 
 def folds_sample() -> str:
-    return writer.line(_folds(SWEEPS[0]))
+    return writer.line(_folds(next(iter(BOARDS)), FOLDS_N[0]))
 
 
-def _folds(sweeps: int) -> tuple[str, ...]:
-    found = folding.rates(sweeps, count=1500)
-    values = (found.folds, found.apart, found.joined, found.within, found.straight)
-    return (str(sweeps), *(f"{100 * value:.1f}" for value in values))
+def _folds(board: str, most_n: float) -> tuple[str, ...]:
+    file, levels = BOARDS[board]
+    found = folding.found(examples() / file, levels, most_n)
+    return (board, f"{most_n:g} N", *map(_share, (found.folds, found.within, found.joined)))
+
+
+def _share(hits: list[bool]) -> str:
+    low, high = (100 * end for end in wilson(sum(hits), len(hits)))
+    return f"{100 * np.mean(hits):.1f} % ({low:.1f} to {high:.1f})"
