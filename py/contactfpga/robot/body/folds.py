@@ -142,11 +142,10 @@ def _read(values: Any) -> Folds:
         raise BodyError("joint must be a text, and step_rad a number from 0.0001 to 1")
     if rows is None or columns is None or not (0 <= rows <= 64 and 0 <= columns <= 64):
         raise BodyError(f"lines is {shown(values['lines'])}; it must be rows and columns, 64 at most")
-    if (version := whole(values.get("version", 1))) not in (1, VERSION):
-        raise BodyError(f"its version is {shown(values['version'])}; this contactfpga reads up to {VERSION}")
+    version = whole(values.get("version", 1))
     levels = whole(values["levels"]) if version == VERSION else 1
-    if levels is None or not 1 <= levels <= MAX_LEVELS:
-        raise BodyError(f"levels is {shown(values['levels'])}; it must be a whole number from 1 to {MAX_LEVELS}")
+    if version not in (1, VERSION) or levels is None or not 1 <= levels <= MAX_LEVELS:
+        raise BodyError(f"it must have version {VERSION} at most, and from 1 to {MAX_LEVELS} levels of force")
     frames: dict[int, int] = {}
     reached: dict[int, Levels] = {}
     if len(values["steps"]) > MAX_STEPS:
@@ -158,9 +157,8 @@ def _read(values: Any) -> Folds:
         frames[number], reached[number] = count, np.zeros((rows, columns), np.uint8)
         for cell in step["cells"]:
             row, column, level = cell if version == VERSION else (*cell, 1)
-            if None in map(whole, (row, column, level)) or not (0 <= row < rows and 0 <= column < columns):
-                raise BodyError(f"a cell is {shown(cell)}; the sheet has {rows}x{columns}")
-            if not 1 <= level <= levels:
-                raise BodyError(f"a cell is {shown(cell)}, whose last number is its level; there are {levels}")
+            limits = ((0, row, rows - 1), (0, column, columns - 1), (1, level, levels))
+            if any(whole(one) is None or not low <= one <= high for low, one, high in limits):
+                raise BodyError(f"a cell is {shown(cell)}; the sheet has {rows}x{columns} and {levels} levels")
             reached[number][row, column] = level
     return Folds(joint, float(step_rad), (rows, columns), frames, reached, levels)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ SWEEPS, SHEETS = 20, 5
 FINGER_MM, TOUCH_N = 9.0, 5.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """Outcomes of each trial: of ``folds`` whether any frame of a fold without a touch passes for one; of ``within``
     and ``joined`` whether a touch is found, all or some of whose cells the fold presses as well."""
 
@@ -69,36 +69,38 @@ def levels_of(forces_n: np.ndarray, reading: light.Reading) -> np.ndarray:
     return np.asarray(sum((forces_n >= one).astype(np.int64) for one in reading.forces_n))
 
 
-def found(path: Path, levels: int, most_n: float, folds: int = 1000, touches: int = 1000, seed: int = 1) -> Found:
-    """Outcomes on sheets of the Skin in a file, with so many of its levels."""
-    whole, cover, rng = Skin.load(path), load_cover(path), np.random.default_rng(seed)
+def trials(path: Path, most_n: float, folds: int = 1000, touches: int = 1000, seed: int = 1) -> dict[int, Found]:
+    """Outcomes on sheets of the Skin in a file, with its lightest level alone and with all, by their number."""
+    skin, cover, rng = Skin.load(path), load_cover(path), np.random.default_rng(seed)
     assert cover is not None
     assert cover.cell is not None
-    skin = whole.replace(harder=whole.harder[: levels - 1])
     usual, early = (light.reading_of(one, cover.cell) for one in (skin, skin.replace(harder=instants(skin))))
-    outcomes, layout = Found([], [], []), skin.sheet
+    outcomes, layout = {levels: Found([], [], []) for levels in (1, skin.levels)}, skin.sheet
     for sheet in range(SHEETS):
         gains, _ = cover.cell.drawn((skin.rows, skin.columns), seed + sheet)
         sweeps = [levels_of(folded(skin, most_n, rng) / gains, early) for _ in range(SWEEPS)]
         frames = (frame_of(one, layout) for one in np.concatenate(sweeps))
         known = learn("joint", zip(np.tile(ANGLES, SWEEPS).tolist(), frames))
-        explained = np.array([known.explained(angle) for angle in ANGLES.tolist()])
+        one = dataclasses.replace(known, levels=1, reached={step: most > 0 for step, most in known.reached.items()})
+        explained = {
+            each.levels: np.array([each.explained(angle) for angle in ANGLES.tolist()]) for each in (one, known)
+        }
         for _ in range(folds // SHEETS):
             read = levels_of(folded(skin, most_n, rng) / gains, usual)
-            outcomes.folds.append(bool((read > explained).any()))
+            for levels, found in outcomes.items():
+                found.folds.append(bool((np.minimum(read, levels) > explained[levels]).any()))
         for _ in range(touches // SHEETS):
             at = rng.integers(len(ANGLES) // 8, len(ANGLES))
-            alone, finger = folded(skin, most_n, rng)[at], touch(skin, cover, rng)
-            pressed, creased = (levels_of(one / gains, usual) > 0 for one in (finger, alone))
-            if (pressed & creased).any():
-                read = levels_of((alone + finger) / gains, usual)
-                kind = outcomes.joined if (pressed & ~creased).any() else outcomes.within
-                kind.append(bool(((read > explained[at]) & (finger > 0)).any()))
+            alone, finger = folded(skin, most_n, rng)[at] / gains, touch(skin, cover, rng) / gains
+            pressed, creased, read = (levels_of(each, usual) for each in (finger, alone, finger + alone))
+            for levels, found in outcomes.items():
+                kind = found.joined if (pressed > 0)[creased == 0].any() else found.within
+                if (pressed > 0)[creased > 0].any():
+                    kind.append(bool((np.minimum(read, levels) > explained[levels][at])[finger > 0].any()))
     return outcomes
 
 
 def frame_of(levels: np.ndarray, sheet: Sheet) -> Zones:
     """A frame of a board that reads so."""
-    cells, told = levels > 0, levels if sheet.levels > 1 else None
-    frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(sheet), cells, told)
+    frame = Frame(0, 0, frozenset(), 0, 0, 0, int((levels > 0).sum()), no_records(sheet), levels > 0, levels)
     return Zones(frame, sheet, 0)

@@ -94,13 +94,8 @@ POINTS = (3, 4, 6, 10)
 SHOWN = (3, 6)
 FOLDS_N = (2.0, 1.0, 0.5)
 """Force of a fold on the cell that it presses most."""
-BOARDS = {
-    "soft kit, one level": ("kits/soft/skin.toml", 1),
-    "soft kit": ("kits/soft/skin.toml", 3),
-    "`levels.toml`": ("levels.toml", 3),
-}
-"""Skin and its levels."""
-NOT_SHOWN = "soft kit, one level", "1 N"
+BOARDS = ("kits/soft/skin.toml", "levels.toml")
+"""Examples of Skins."""
 
 
 def outages_table() -> str:
@@ -136,26 +131,20 @@ def registration_table() -> writer.Table:
     return writer.Table(head, rows, lambda row: row in shown, columns)
 
 
-def folds_table() -> writer.Table:
-    head = (
-        "board",
-        "a fold presses",
-        "folds taken for a touch",
-        "touches within it found",
-        "touches over its edge found",
-    )
-    rows = [_folds(board, most_n) for most_n in FOLDS_N for board in BOARDS]
-    return writer.Table(head, rows, lambda row: (row[0], row[1]) != NOT_SHOWN)
+def folds_table() -> str:
+    head = ("board", "a fold presses", "folds taken for a touch", "of one level", "touches within it found")
+    rows = [(*head, "with one level", "touches over its edge found")]
+    return writer.table_of([*rows, *(_folds(board, most_n) for most_n in FOLDS_N for board in BOARDS)])
 
 
 def folds_sample() -> str:
-    return writer.line(_folds(next(iter(BOARDS)), FOLDS_N[0]))
+    return writer.line(_folds(BOARDS[0], FOLDS_N[0]))
 
 
 def _folds(board: str, most_n: float) -> tuple[str, ...]:
-    file, levels = BOARDS[board]
-    found = folding.found(examples() / file, levels, most_n)
-    return (board, f"{most_n:g} N", *map(_share, (found.folds, found.within, found.joined)))
+    one, three = folding.trials(examples() / board, most_n).values()
+    shares = (three.folds, one.folds, three.within, one.within, three.joined)
+    return (f"`{board}`", f"{most_n:g} N", *map(_share, shares))
 
 
 def _share(hits: list[bool]) -> str:
