@@ -134,7 +134,7 @@ def test_a_board_that_is_unplugged_is_reported(capsys):
         assert settle.measure(board, arguments(None, in_json=False)) == 1
     said = capsys.readouterr().out
     assert "fault the board was unplugged" in said
-    assert "may still sample too early, so that pressed switches read released; switch it off and on" in said
+    assert "may still sample at other instants than its Skin states, so that cells read wrongly" in said
     assert "Nothing was measured" in said
 
 

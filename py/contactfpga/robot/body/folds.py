@@ -1,6 +1,7 @@
 """Cells that the folding cover presses at a joint: learned with nobody near, per joint angle, then marked.
 
-Folds are by cells, as a finger beside a crease makes one zone with it.
+Folds are by cells, as a finger beside a crease makes one zone with it. Where the board tells levels of force, a cell
+above the level that the fold reaches is a touch.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from numpy.typing import NDArray
 from contactfpga.inputs.files import read_small, write_text
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.robot.body.state import BodyError
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import MAX_RULER
+from contactfpga.skin.sheet import MAX_LEVELS
 from contactfpga.zones.zone import Zones
 
 STEP_RAD = 0.05
@@ -26,7 +30,14 @@ MAX_BYTES = 20_000_000
 MAX_STEPS = 10_000
 """Most steps of an angle; a full turn needs 126."""
 
-Cells = NDArray[np.bool_]
+VERSION = 2
+"""Version of the file. The first one, which states none, has cells without levels."""
+LATER = 1.5
+"""Factor of the instants at which harder levels are sampled while folds are learned. A cell whose resistance falls as
+1/F then reaches a level at two thirds of its force, which leaves a margin for folds that press harder later."""
+
+Levels = NDArray[np.integer[Any] | np.bool_]
+"""(rows, columns) level of each cell, 0 at rest; pressed or not where there is one level."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,29 +50,49 @@ class Folds:
     """Rows and columns."""
     frames: dict[int, int]
     """Frames seen, by step number."""
-    cells: dict[int, Cells]
-    """(rows, columns) cells pressed in any of these frames, by step number."""
+    reached: dict[int, Levels]
+    """Highest level of each cell in any of these frames, by step number."""
+    levels: int = 1
+    """Levels of force that the board tells."""
 
     def step_of(self, angle_rad: float) -> int:
         """Number of an angle's step."""
         return math.floor(angle_rad / self.step_rad)
 
-    def share(self, angle_rad: float, zone: Cells) -> float | None:
-        """Share of a zone's cells that the fold presses at this angle; None if nothing was learned there, or without
-        cells."""
-        # The steps beside it count nothing: with them twice as many fingers that touch a crease pass for it.
+    def explained(self, angle_rad: float) -> Levels | None:
+        """Highest level of each cell that the fold may reach at this angle; None if nothing was learned there.
+
+        With several levels these are also the levels of the steps beside it, and the lightest level of all cells next
+        to those that the fold presses.
+        """
         step = self.step_of(angle_rad)
-        if not self.frames.get(step) or not zone.any():
+        if not self.frames.get(step):
             return None
-        return float((zone & self.cells[step]).sum() / zone.sum())
+        if self.levels == 1:  # with the steps beside it twice as many fingers that touch a crease would pass for it
+            return self.reached[step]
+        most = np.max([self.reached[one] for one in range(step - 1, step + 2) if one in self.reached], axis=0)
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(most > 0, 1), (3, 3)).any(axis=(2, 3))
+        explained: Levels = np.maximum(most, around)
+        return explained
+
+    def share(self, angle_rad: float, zone: Levels) -> float | None:
+        """Share of a zone's cells that are at most at the level of the fold at this angle; ``zone`` is 0 on all other
+        cells. None if nothing was learned there, or without cells."""
+        explained = self.explained(angle_rad)
+        if explained is None or not zone.any():
+            return None
+        return float(((zone > 0) & (zone <= explained)).sum() / (zone > 0).sum())
 
     def save(self, path: str | Path) -> None:
         """Write a JSON file that :meth:`load` reads."""
+        # A row of three numbers for each cell that is not at rest: row, column, level.
+        cells = {step: np.column_stack([np.argwhere(most), most[most > 0]]) for step, most in self.reached.items()}
         steps = [
-            {"step": step, "frames": count, "cells": np.argwhere(self.cells[step]).tolist()}
+            {"step": step, "frames": count, "cells": cells[step].tolist()}
             for step, count in sorted(self.frames.items())
         ]
-        values = {"joint": self.joint, "step_rad": self.step_rad, "lines": self.lines, "steps": steps}
+        values = {"version": VERSION, "joint": self.joint, "step_rad": self.step_rad, "lines": self.lines}
+        values |= {"levels": self.levels, "steps": steps}
         write_text(path, json.dumps(values) + "\n")
 
     @classmethod
@@ -83,8 +114,8 @@ def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = S
     if not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
         raise BodyError(f"step_rad is {shown(step_rad)}; it must be a number from 0.0001 to 1")
     counts: dict[int, int] = {}
-    cells: dict[int, Cells] = {}
-    lines = (0, 0)
+    reached: dict[int, Levels] = {}
+    lines, levels = (0, 0), 1
     for angle, zones in frames:
         if zones.cells is None:
             raise BodyError(
@@ -92,10 +123,16 @@ def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = S
                 'report = "cells"'
             )
         step = math.floor(angle / step_rad)
-        lines = (zones.sheet.rows, zones.sheet.columns)
+        lines, levels = (zones.sheet.rows, zones.sheet.columns), zones.sheet.levels
         counts[step] = counts.get(step, 0) + 1
-        cells[step] = cells.get(step, np.zeros(lines, bool)) | zones.cells
-    return Folds(joint, step_rad, lines, counts, cells)
+        reached[step] = np.maximum(reached.get(step, 0), zones.cells if zones.levels is None else zones.levels)
+    return Folds(joint, step_rad, lines, counts, reached, levels)
+
+
+def instants(skin: Skin) -> tuple[int, ...]:
+    """Instants in sixteenths of the ruler's time at which a board samples its harder levels while folds are
+    learned."""
+    return tuple(min(MAX_RULER, round(LATER * one)) for one in skin.harder)
 
 
 def _read(values: Any) -> Folds:
@@ -105,17 +142,23 @@ def _read(values: Any) -> Folds:
         raise BodyError("joint must be a text, and step_rad a number from 0.0001 to 1")
     if rows is None or columns is None or not (0 <= rows <= 64 and 0 <= columns <= 64):
         raise BodyError(f"lines is {shown(values['lines'])}; it must be rows and columns, 64 at most")
+    version = whole(values.get("version", 1))
+    levels = whole(values["levels"]) if version == VERSION else 1
+    if version not in (1, VERSION) or levels is None or not 1 <= levels <= MAX_LEVELS:
+        raise BodyError(f"it must have version {VERSION} at most, and from 1 to {MAX_LEVELS} levels of force")
     frames: dict[int, int] = {}
-    cells: dict[int, Cells] = {}
+    reached: dict[int, Levels] = {}
     if len(values["steps"]) > MAX_STEPS:
         raise BodyError(f"it has {len(values['steps']):,} steps of angles; the limit is {MAX_STEPS:,}")
     for step in values["steps"]:
         number, count = whole(step["step"]), whole(step["frames"])
         if number is None or count is None or count < 1:
             raise BodyError(f"a step is {shown(step)}; its step and frames must be whole numbers")
-        frames[number], cells[number] = count, np.zeros((rows, columns), bool)
-        for row, column in step["cells"]:
-            if whole(row) is None or whole(column) is None or not (0 <= row < rows and 0 <= column < columns):
-                raise BodyError(f"a cell is {shown([row, column])}; the sheet has {rows}x{columns}")
-            cells[number][row, column] = True
-    return Folds(joint, float(step_rad), (rows, columns), frames, cells)
+        frames[number], reached[number] = count, np.zeros((rows, columns), np.uint8)
+        for cell in step["cells"]:
+            row, column, level = cell if version == VERSION else (*cell, 1)
+            limits = ((0, row, rows - 1), (0, column, columns - 1), (1, level, levels))
+            if any(whole(one) is None or not low <= one <= high for low, one, high in limits):
+                raise BodyError(f"a cell is {shown(cell)}; the sheet has {rows}x{columns} and {levels} levels")
+            reached[number][row, column] = level
+    return Folds(joint, float(step_rad), (rows, columns), frames, reached, levels)

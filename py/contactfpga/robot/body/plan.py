@@ -130,6 +130,9 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         raise BodyError(f"folds are of {folds.lines} cells; the Skin has {(skin.rows, skin.columns)}")
     if folds is not None and skin.report != "cells":
         raise BodyError(f"report is {shown(skin.report)}; folds are marked cell by cell, with report = 'cells'")
+    if folds is not None and folds.levels != skin.levels:
+        has, needs = folds.levels, skin.levels
+        raise BodyError(f"folds have {has} levels, the Skin {needs}; learn them again with `contactfpga body learn`")
     units = LoadCells.load(folder / text(values, "units")) if "units" in values else None
     if units is not None and len(units.units) != skin.units:
         raise BodyError(f"its file of units has {len(units.units)}; the Skin has units = {skin.units}")

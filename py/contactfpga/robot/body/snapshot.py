@@ -58,8 +58,8 @@ class LinkContact:
     track: int | None = None
     """Id that stays with the contact, unique on this link; None without a place or tracking."""
     fold: float | None = None
-    """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 the fold
-    alone may explain the zone. None if unknown."""
+    """Share of the zone's cells, 0 to 1, that the folding cover presses at the joint's angle as hard as they are
+    pressed; at 1 the fold alone may explain the zone. None if unknown."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 
@@ -156,7 +156,9 @@ def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | No
     if plan.folds is None or angles is None or plan.folds.joint not in angles:
         return None
     cells = zones.cells_of(zone)
-    return None if cells is None else plan.folds.share(angles[plan.folds.joint], cells)
+    if cells is None:
+        return None
+    return plan.folds.share(angles[plan.folds.joint], cells if zones.levels is None else cells * zones.levels)
 
 
 BASE, LINK = "base", "link"

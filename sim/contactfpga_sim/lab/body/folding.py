@@ -1,103 +1,106 @@
-"""A cover that folds at a joint and presses switches: shares of folds and touches marked."""
+"""A cover that folds at a joint and presses cells: folds that pass for touches, and touches that are found in them.
+
+A crease grows across the sheet from one end with the angle, and presses hardest in its middle. Each fold differs from
+the one before: all cells by one factor, each by one more, and by the place of the crease. A touch adds its forces. The
+film's gains are drawn for each sheet. All of it is assumed but the finger's forces, which the cover's model gives.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.robot.body.folds import STEP_RAD, Folds, learn
+from contactfpga.design.cover import Cover, load_cover
+from contactfpga.robot.body.folds import instants, learn
 from contactfpga.skin import Skin
+from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
+from contactfpga_sim.apps import light
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.scene import Contact, Scene
 
-SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0
+ANGLES = np.linspace(BEGINS_RAD, RANGE_RAD, 57)
+"""Angles in rad of the frames of a fold."""
 OFF_RAD = 0.01
 """Standard deviation of the reported angle."""
-FLICKER = 0.3
-"""Chance that a cell at a fold's rim is open."""
-FINGER_MM = 9.0
+SPREAD = 0.1
+"""Standard deviations of the logarithms of a fold's force and of its share on each cell, from fold to fold."""
+MOVED_MM = 1.0
+"""Standard deviation of the crease's place, from fold to fold."""
+SWEEPS, SHEETS = 20, 5
+"""Folds that are learned, and sheets drawn."""
+FINGER_MM, TOUCH_N = 9.0, 5.0
 
 
-def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray:
-    """(rows, columns) bool crease across rows 0 to 3, from 0.6 rad on, growing with the angle. Without ``rng``: all
-    cells it can press."""
-    cells = np.zeros((SKIN.rows, SKIN.columns), bool)
-    if rng is not None:
-        angle_rad += OFF_RAD * rng.standard_normal()
-    deep = (angle_rad - BEGINS_RAD) / (RANGE_RAD - BEGINS_RAD)
-    if deep <= 0:
-        return cells
-    half, rows = 2 + 4 * deep, 1 + 3 * deep
-    y, x = np.mgrid[: SKIN.rows, : SKIN.columns]
-    distance = np.maximum(np.abs(x - 7.5) / half, (y + 0.5) / rows)
-    cells |= distance <= 1
-    if rng is None:
-        return cells
-    rim = cells & (distance > 0.75)
-    return cells & ~(rim & (rng.random(cells.shape) < FLICKER))
+class Found(NamedTuple):
+    """Outcomes of each trial: of ``folds`` whether any frame of a fold without a touch passes for one; of ``within``
+    and ``joined`` whether a touch is found, all or some of whose cells the fold presses as well."""
+
+    folds: list[bool]
+    within: list[bool]
+    joined: list[bool]
 
 
-def touch(x_mm: float, y_mm: float) -> np.ndarray:
-    disc = Contact(shape=contacts.disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm, force_n=10.0)
-    return np.asarray(Scene((disc,)).pressed(0.0, SKIN), bool)
+def folded(skin: Skin, most_n: float, rng: np.random.Generator) -> np.ndarray:
+    """(frames, rows, columns) forces in N of a fold at :data:`ANGLES`, at most ``most_n`` on a cell of a usual one."""
+    x, y = np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows)[:, None] * skin.pitch_y_mm
+    angles = ANGLES + OFF_RAD * rng.standard_normal(len(ANGLES))
+    deep = np.maximum(0, (angles - BEGINS_RAD) / (RANGE_RAD - BEGINS_RAD))[:, None, None]
+    along = np.abs(x - x.mean()) / (15 + 30 * deep)
+    across = (y + skin.pitch_y_mm / 2 + MOVED_MM * rng.standard_normal()) / (10 + 25 * deep)
+    differs = np.exp(SPREAD * (rng.standard_normal() + rng.standard_normal((skin.rows, skin.columns))))
+    return np.asarray(most_n * deep * np.maximum(0, 1 - np.maximum(along, across) ** 2) * differs)
 
 
-def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
-    frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, None)
-    return Zones(frame, skin.sheet, 0)
+def touch(skin: Skin, cover: Cover, rng: np.random.Generator) -> np.ndarray:
+    """(rows, columns) forces in N of a fingertip somewhere on the crease."""
+    x_mm, y_mm = rng.uniform(0.1, 0.9) * skin.columns * skin.pitch_x_mm, rng.uniform(0, 30)
+    finger = Contact(shape=contacts.disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm, force_n=TOUCH_N)
+    return Scene((finger,)).forces_n(0.0, skin, cover)
 
 
-def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
-    angles = np.tile(np.linspace(0, RANGE_RAD, frames), sweeps)
-    return learn("joint", ((angle, frame_of(fold(angle, rng))) for angle in angles.tolist()))
+def levels_of(forces_n: np.ndarray, reading: light.Reading) -> np.ndarray:
+    """Number of the reading's forces that each force reaches."""
+    return np.asarray(sum((forces_n >= one).astype(np.int64) for one in reading.forces_n))
 
 
-@dataclasses.dataclass(frozen=True)
-class Rates:
-    """Shares of zones and touches, from 0 to 1."""
-
-    folds: float
-    """Fold-only zones marked, as they should be."""
-    apart: float
-    """Separate touches marked by mistake while the cover is folded."""
-    joined: float
-    """Touches joined to the fold's zone, marked by mistake."""
-    within: float
-    """Touches marked whose cells the fold can all press: no switch can tell."""
-    straight: float
-    """Touches marked by mistake with the joint straight."""
-
-
-def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:
-    rng = np.random.default_rng(seed)
-    known = learned(sweeps, rng)
-    seen: dict[str, list[bool]] = {name: [] for name in ("folds", "apart", "joined", "within", "straight")}
-    for _ in range(count):
-        angle = float(rng.uniform(BEGINS_RAD + 2 * STEP_RAD, RANGE_RAD - STEP_RAD))
-        seen["folds"] += _marks(known, angle, fold(angle, rng))
-        # Half of the touches come near the crease, where they are hardest to tell from it.
-        high = 40.0 if rng.integers(2) else 150.0
-        finger = touch(float(rng.uniform(0, 150)), float(rng.uniform(0, high)))
-        if not finger.any():
-            continue
-        seen["straight"] += _marks(known, float(rng.uniform(0, BEGINS_RAD - 2 * STEP_RAD)), finger)
-        creased = fold(angle, rng)
-        both = frame_of(creased | finger)
-        mine = [cells for cells in _zones(both) if (cells & finger).any()]
-        beyond = bool((finger & ~fold(angle)).any())
-        for cells in mine:
-            kind = "within" if not beyond else "joined" if (cells & creased).any() else "apart"
-            seen[kind].append(known.share(angle, cells) == 1)
-    return Rates(**{name: float(np.mean(marks)) if marks else float("nan") for name, marks in seen.items()})
+def trials(path: Path, most_n: float, folds: int = 1000, touches: int = 1000, seed: int = 1) -> dict[int, Found]:
+    """Outcomes on sheets of the Skin in a file, with its lightest level alone and with all, by their number."""
+    skin, cover, rng = Skin.load(path), load_cover(path), np.random.default_rng(seed)
+    assert cover is not None
+    assert cover.cell is not None
+    usual, early = (light.reading_of(one, cover.cell) for one in (skin, skin.replace(harder=instants(skin))))
+    outcomes, layout = {levels: Found([], [], []) for levels in (1, skin.levels)}, skin.sheet
+    for sheet in range(SHEETS):
+        gains, _ = cover.cell.drawn((skin.rows, skin.columns), seed + sheet)
+        sweeps = [levels_of(folded(skin, most_n, rng) / gains, early) for _ in range(SWEEPS)]
+        frames = (frame_of(one, layout) for one in np.concatenate(sweeps))
+        known = learn("joint", zip(np.tile(ANGLES, SWEEPS).tolist(), frames))
+        one = dataclasses.replace(known, levels=1, reached={step: most > 0 for step, most in known.reached.items()})
+        explained = {
+            each.levels: np.array([each.explained(angle) for angle in ANGLES.tolist()]) for each in (one, known)
+        }
+        for _ in range(folds // SHEETS):
+            read = levels_of(folded(skin, most_n, rng) / gains, usual)
+            for levels, found in outcomes.items():
+                found.folds.append(bool((np.minimum(read, levels) > explained[levels]).any()))
+        for _ in range(touches // SHEETS):
+            at = rng.integers(len(ANGLES) // 8, len(ANGLES))
+            alone, finger = folded(skin, most_n, rng)[at] / gains, touch(skin, cover, rng) / gains
+            pressed, creased, read = (levels_of(each, usual) for each in (finger, alone, finger + alone))
+            for levels, found in outcomes.items():
+                kind = found.joined if (pressed > 0)[creased == 0].any() else found.within
+                if (pressed > 0)[creased > 0].any():
+                    kind.append(bool((np.minimum(read, levels) > explained[levels][at])[finger > 0].any()))
+    return outcomes
 
 
-def _zones(zones: Zones) -> list[np.ndarray]:
-    return [cells for zone in zones if (cells := zones.cells_of(zone)) is not None]
-
-
-def _marks(known: Folds, angle: float, cells: np.ndarray) -> list[bool]:
-    return [known.share(angle, each) == 1 for each in _zones(frame_of(cells))]
+def frame_of(levels: np.ndarray, sheet: Sheet) -> Zones:
+    """A frame of a board that reads so."""
+    frame = Frame(0, 0, frozenset(), 0, 0, 0, int((levels > 0).sum()), no_records(sheet), levels > 0, levels)
+    return Zones(frame, sheet, 0)

@@ -14,7 +14,9 @@ from contactfpga.robot.body import BodyError, registration
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan, read
 from contactfpga.robot.body.registration import Press
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin
+from contactfpga_sim.apps.score import wilson
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.body import folding, outages
 from contactfpga_sim.model.scenes import contacts
@@ -90,7 +92,10 @@ def _errors(true: Plan, found: Pose, rms_mm: float) -> tuple[float, float, float
 
 POINTS = (3, 4, 6, 10)
 SHOWN = (3, 6)
-SWEEPS = (1, 2, 5, 10)
+FOLDS_N = (2.0, 1.0, 0.5)
+"""Force of a fold on the cell that it presses most."""
+BOARDS = ("kits/soft/skin.toml", "levels.toml")
+"""Examples of Skins."""
 
 
 def outages_table() -> str:
@@ -127,16 +132,21 @@ def registration_table() -> writer.Table:
 
 
 def folds_table() -> str:
-    head = ("times over the range", "folds, %", "touches apart from the fold, %", "touches joined with it, %")
-    rows: list[tuple[str, ...]] = [(*head, "touches within it, %", "touches, joint straight, %")]
-    return writer.table_of([*rows, *map(_folds, SWEEPS)])
+    head = ("board", "a fold presses", "folds taken for a touch", "of one level", "touches within it found")
+    rows = [(*head, "with one level", "touches over its edge found")]
+    return writer.table_of([*rows, *(_folds(board, most_n) for most_n in FOLDS_N for board in BOARDS)])
 
 
 def folds_sample() -> str:
-    return writer.line(_folds(SWEEPS[0]))
+    return writer.line(_folds(BOARDS[0], FOLDS_N[0]))
 
 
-def _folds(sweeps: int) -> tuple[str, ...]:
-    found = folding.rates(sweeps, count=1500)
-    values = (found.folds, found.apart, found.joined, found.within, found.straight)
-    return (str(sweeps), *(f"{100 * value:.1f}" for value in values))
+def _folds(board: str, most_n: float) -> tuple[str, ...]:
+    one, three = folding.trials(examples() / board, most_n).values()
+    shares = (three.folds, one.folds, three.within, one.within, three.joined)
+    return (f"`{board}`", f"{most_n:g} N", *map(_share, shares))
+
+
+def _share(hits: list[bool]) -> str:
+    low, high = (100 * end for end in wilson(sum(hits), len(hits)))
+    return f"{100 * np.mean(hits):.1f} % ({low:.1f} to {high:.1f})"

@@ -11,11 +11,14 @@ from typing import Any, TextIO
 import numpy as np
 
 from contactfpga import terminal
+from contactfpga.driver.board import Board
 from contactfpga.inputs.values import number_in, shown
 from contactfpga.robot.body import Body, folds
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.reader import open_board
 from contactfpga.tools.commands.body.register import link
+from contactfpga.tools.commands.wire.settle import restored
 from contactfpga.tools.console import flags, numbers, outputs, results
 from contactfpga.zones.zone import Zones
 
@@ -42,9 +45,11 @@ def run(args: argparse.Namespace) -> int:
     terminal.say(
         f"move {args.joint} slowly over its whole range, there and back; nobody may touch the cover", sys.stderr
     )
-    alone = Body({plan.name: plan})
-    with alone.open() as opened:
-        found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
+    try:
+        with OpenBody(Body({plan.name: plan}), opened=_with_margin) as opened:
+            found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
+    finally:
+        _restore(plan)
     if not found.frames:
         raise ValueError("no angle came on standard input; let the robot write one per line")
     found.save(output)
@@ -54,9 +59,9 @@ def run(args: argparse.Namespace) -> int:
         "frames": sum(found.frames.values()),
         "from_rad": first * found.step_rad,
         "to_rad": (last + 1) * found.step_rad,
-        "cells": np.any(list(found.cells.values()), axis=0).sum(),
+        "cells": np.any(list(found.reached.values()), axis=0).sum(),
         "steps": len(found.frames),
-        "steps_pressed": sum(bool(one.any()) for one in found.cells.values()),
+        "steps_pressed": sum(bool(one.any()) for one in found.reached.values()),
         "steps_missed": last - first + 1 - len(found.frames),
     }
     results.show(args, answer, lambda: _show(answer))
@@ -84,6 +89,25 @@ def _check(body: Body, plan: Plan, joint: str) -> None:
             f'link {shown(plan.name)}: its Skin has report = "{plan.skin.report}"; folds are learned cell by cell, so '
             'build it with report = "cells"'
         )
+
+
+def _with_margin(plan: Plan) -> Board:
+    """The link's board, which samples harder levels later (:func:`contactfpga.robot.body.folds.instants`)."""
+    board = open_board(plan)
+    try:
+        for level, instant in enumerate(folds.instants(plan.skin), 2):
+            board.sample_at(instant, level=level)
+    except BaseException:
+        board.close()
+        raise
+    return board
+
+
+def _restore(plan: Plan) -> None:
+    if plan.skin.harder:
+        with open_board(plan) as board:
+            for left in restored(board, 1.0):
+                terminal.say(left.sentence, sys.stderr)
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:

@@ -106,8 +106,8 @@ def restored(board: Board, timeout: float) -> list[Finding]:
             except ContactFPGAError:
                 break
     left = (
-        f"{board.port} may still sample too early, so that pressed switches read released; switch it off and on, or "
-        "run this command again"
+        f"{board.port} may still sample at other instants than its Skin states, so that cells read wrongly; switch it "
+        "off and on, or run this command again"
     )
     return [Finding("fault", left)]
 
