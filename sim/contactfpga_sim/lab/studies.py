@@ -139,6 +139,7 @@ _ALL = (
             sensitivity=Section("sensitivity:sensitivity_table"),
             beds=Section("beds:beds_table"),
             against=Section("soft:verdict_table", page="soft.md"),
+            soft_breaks=Section("breaks:breaks_table", page="soft.md"),
             leakage=Section("soft:leakage_table", page="soft.md", sample="soft:leakage_table"),
         ),
         compute="tables:compute",
