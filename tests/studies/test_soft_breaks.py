@@ -1,5 +1,5 @@
-"""Disturbances of the soft kit's film. No other test kills a limit that is not the least one that fails, a cell that its
-own preload presses, and a level that does not follow its column's capacitor."""
+"""Disturbances of the soft kit's film. No other test kills a limit that is not the least one that fails, a cell that
+its own preload presses, and a level that does not follow its column's capacitor."""
 
 import dataclasses
 import math
@@ -33,9 +33,9 @@ def test_levels_are_those_of_the_compiled_board():
     assert set(want[far].flat) == {0, 1, 2, 3}
 
 
-def test_nothing_reads_pressed_at_rest_but_by_what_came_later(rng):
+def test_nothing_reads_pressed_at_rest_but_by_what_came_later():
     """A cover that presses five times as hard is masked; leakage that was not there at rest is not."""
-    heavy = Film(dataclasses.replace(CELL, preload_n=0.1))
+    rng, heavy = np.random.default_rng(4), Film(dataclasses.replace(CELL, preload_n=0.1))
     assert not any(film.levels(REST, rng).any() for film in (Film(), heavy) for _ in range(20))
     assert any(DISTURBANCES["leakage of the pins"].film(10.0).levels(REST, rng).any() for _ in range(5))
 
@@ -43,12 +43,14 @@ def test_nothing_reads_pressed_at_rest_but_by_what_came_later(rng):
 @pytest.mark.parametrize("percent", [2.0, 10.0])
 def test_a_level_follows_its_columns_capacitor(percent):
     """The fall's time goes as all of the column's picofarads, here beside an opposite ruler."""
-    share = percent / 100 * 220 / (220 + CIRCUIT.line_pf + SKIN.row_lines * CIRCUIT.crossing_pf + 2 * CIRCUIT.neighbor_pf)
+    share = (
+        percent / 100 * 220 / (220 + CIRCUIT.line_pf + SKIN.row_lines * CIRCUIT.crossing_pf + 2 * CIRCUIT.neighbor_pf)
+    )
     want = math.log2((1 + share) / (1 - share))
     assert DISTURBANCES["capacitors, off by"].off(percent) == pytest.approx(want, rel=0.15)
 
 
-def test_an_open_finger_is_one_contact_and_two_thirds_of_an_octave_are_a_quarter_hours_creep():
+def test_a_finger_is_one_contact_and_creep_lowers_its_levels():
     assert all(breaks._touch(Film(), np.random.default_rng(seed)).right for seed in range(5))
     minutes = DISTURBANCES["creep in a touch that lasts"].off
     assert minutes(1000 / 60) == pytest.approx(-math.log2(1 - 3 * CELL.creep))

@@ -127,7 +127,7 @@ _ALL = (
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
-        minutes=3.2,
+        minutes=3.8,
         sections=tables(
             "times built",
             kits=Section("tables:headline", page="../README.md"),
@@ -150,7 +150,7 @@ _ALL = (
         "levels",
         title="One level of force and several, read by the host",
         page="levels.md",
-        minutes=4,
+        minutes=5,
         sections=tables("levels verdict places", entries=Section("tables:entries_table", page="benchmark.md")),
         compute="tables:compute",
         pictures="tables:draw",

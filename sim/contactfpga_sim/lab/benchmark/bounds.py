@@ -30,7 +30,7 @@ FAMILIES, COUNT = ("bumper", "edge"), 40
 """Families of single contacts that domes seldom part, and touches of each."""
 KIND = "bound"
 NAMES = ("domes' least error, one frame", "domes' least error, closings")
-MOMENTS, SIDE, ROUNDS = 10, 7, 3
+MOMENTS, SIDE, ROUNDS = 10, 7, 4
 """Moments of an approach; places along a grid's side; grids, each around the place found before."""
 
 
@@ -89,7 +89,8 @@ def estimate(log_likelihood: Callable[[float, float], float]) -> np.ndarray:
     middle, span = np.zeros(2), KITS_MM
     for _ in range(ROUNDS):
         axis = span * ((np.arange(SIDE) + 0.5) / SIDE - 0.5)
-        grid = np.clip(middle + np.array(list(itertools.product(axis, axis))), -KITS_MM / 2, KITS_MM / 2)
+        grid = middle + np.array(list(itertools.product(axis, axis)))
+        grid = grid[(np.abs(grid) <= KITS_MM / 2).all(axis=1)]
         logs = np.array([log_likelihood(*one) for one in grid.tolist()])
         weights = np.exp(logs - logs.max())
         middle = weights @ grid / weights.sum()

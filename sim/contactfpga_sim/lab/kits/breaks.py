@@ -125,7 +125,7 @@ DISTURBANCES = {
         "{:.2g} N", 0.02, (0.005, 0.2), lambda newtons: _cell(preload_n=newtons), REST,
         lambda newtons: -math.log2(max(1 - 2 * newtons / CELL.level_n, 1e-9))),
     "creep in a touch that lasts": Disturbance(
-        "{:,.1f} min", 1440.0, (0.1, 1e5), lambda minutes: Film(seconds=60 * minutes), REST),
+        "{:,.0f} min", 1440.0, (0.1, 1e5), lambda minutes: Film(seconds=60 * minutes), REST),
     "temperature": Disturbance(
         "{:.0f} °C", 50.0, (26.0, 85.0), lambda celsius: Film(celsius=celsius, ends=(Corner(celsius=celsius),))),
     "capacitors, off by": Disturbance(
