@@ -40,17 +40,12 @@ def test_nothing_reads_pressed_at_rest_but_by_what_came_later():
     assert any(DISTURBANCES["leakage of the pins"].film(10.0).levels(REST, rng).any() for _ in range(5))
 
 
-@pytest.mark.parametrize("percent", [2.0, 10.0])
-def test_a_level_follows_its_columns_capacitor(percent):
+def test_a_level_follows_its_columns_capacitor():
     """The fall's time goes as all of the column's picofarads, here beside an opposite ruler."""
-    share = (
-        percent / 100 * 220 / (220 + CIRCUIT.line_pf + SKIN.row_lines * CIRCUIT.crossing_pf + 2 * CIRCUIT.neighbor_pf)
-    )
+    share = 0.1 * 220 / (220 + CIRCUIT.line_pf + SKIN.row_lines * CIRCUIT.crossing_pf + 2 * CIRCUIT.neighbor_pf)
     want = math.log2((1 + share) / (1 - share))
-    assert DISTURBANCES["capacitors, off by"].off(percent) == pytest.approx(want, rel=0.15)
+    assert DISTURBANCES["capacitors, off by"].off(10.0) == pytest.approx(want, rel=0.15)
 
 
-def test_a_finger_is_one_contact_and_creep_lowers_its_levels():
+def test_a_finger_is_one_contact():
     assert all(breaks._touch(Film(), np.random.default_rng(seed)).right for seed in range(5))
-    minutes = DISTURBANCES["creep in a touch that lasts"].off
-    assert minutes(1000 / 60) == pytest.approx(-math.log2(1 - 3 * CELL.creep))

@@ -8,6 +8,7 @@ that are closed at rest, or the moment at which each one closed.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 import zlib
@@ -17,7 +18,7 @@ from concurrent.futures import Executor
 import numpy as np
 from scipy.special import log_ndtr
 
-from contactfpga.design.cover import Load, cells_of
+from contactfpga.design.cover import Load, Part, cells_of
 from contactfpga_sim.apps import score
 from contactfpga_sim.apps.covers import DOME, sheet
 from contactfpga_sim.apps.score import MODELS, Entry, Score, Scores
@@ -30,7 +31,7 @@ FAMILIES, COUNT = ("bumper", "edge"), 40
 """Families of single contacts that domes seldom part, and touches of each."""
 KIND = "bound"
 NAMES = ("domes' least error, one frame", "domes' least error, closings")
-MOMENTS, SIDE, ROUNDS = 10, 7, 4
+MOMENTS, SIDE, ROUNDS = 6, 8, 4
 """Moments of an approach; places along a grid's side; grids, each around the place found before."""
 
 
@@ -42,17 +43,21 @@ class Touch:
         cover = scenes.cover_of(self.skin)
         (scene,) = touches(family, 1, SEED, self.skin, cover, number)
         self._cells = cells_of(cover, self.skin.rows, self.skin.columns, pitch_m, pitch_m)
+        self._none = np.zeros((self.skin.rows, self.skin.columns))
         self._loads = [scene.loads(at) for at in (scene.settled_s * np.linspace(0, 1, MOMENTS + 1) ** 2).tolist()]
 
     def forces(self, x_mm: float, y_mm: float, first: int = 0) -> np.ndarray:
         """(moments, rows, columns) largest forces so far, from moment ``first`` on."""
 
-        def moved(load: Load) -> Load:
+        @functools.cache  # a flat body's parts are the same all the time
+        def under_1_n(parts: tuple[Part, ...]) -> np.ndarray:
             x, y = 1e-3 * x_mm, 1e-3 * y_mm
-            parts = (dataclasses.replace(one, x_m=one.x_m + x, y_m=one.y_m + y) for one in load.parts)
-            return dataclasses.replace(load, parts=tuple(parts))
+            moved = (dataclasses.replace(one, x_m=one.x_m + x, y_m=one.y_m + y) for one in parts)
+            return self._cells.forces_n([Load(tuple(moved), 1.0)])
 
-        found = [self._cells.forces_n([moved(one) for one in loads]) for loads in self._loads[first:]]
+        found = [
+            sum((load.force_n * under_1_n(load.parts) for load in loads), self._none) for loads in self._loads[first:]
+        ]
         return np.maximum.accumulate(found) / DOME.force_n
 
     def off_mm(self, rng: np.random.Generator) -> tuple[float, float]:
@@ -95,7 +100,7 @@ def estimate(log_likelihood: Callable[[float, float], float]) -> np.ndarray:
         weights = np.exp(logs - logs.max())
         middle = weights @ grid / weights.sum()
         spread = math.sqrt(float((weights @ (grid - middle) ** 2).max() / weights.sum()))
-        span = min(span, 8 * spread + 2 * span / SIDE)
+        span = min(span, max(6 * spread, 2 * span / SIDE))
     return middle
 
 

@@ -103,11 +103,8 @@ class Disturbance(NamedTuple):
     def off(self, value: float) -> float:
         return self.octaves(value) if self.octaves else self.film(value).octaves()
 
-    def counted(self, value: float) -> Outcome:
-        def draws(value: float, rng: np.random.Generator, count: int) -> list[Outcome]:
-            return [_touch(self.film(value), rng) for _ in range(count)]
-
-        return RateTest(draws, SEED, MOST)(value)
+    def touches(self, value: float, rng: np.random.Generator, count: int) -> list[Outcome]:
+        return [_touch(self.film(value), rng) for _ in range(count)]
 
     def first(self, wrong: Callable[[float], bool]) -> float | None:
         """The least value tried that is wrong, if larger ones are."""
@@ -150,12 +147,12 @@ def _touch(film: Film, rng: np.random.Generator) -> Outcome:
 
 
 def _row(name: str) -> list[str]:
-    one = DISTURBANCES[name]
-    off, lost = one.first(lambda value: one.off(value) > WITHIN), one.first(lambda value: not one.counted(value).right)
-    most = f"above {one.form.format(one.tried[1])}"
-    at = [most if value is None else one.form.format(value) for value in (off, lost)]
-    there, right = f"{one.off(one.expected):.2f}", one.counted(one.expected).rate
-    return [name, one.form.format(one.expected), there, at[0], right, at[1], one.told]
+    one, form = DISTURBANCES[name], DISTURBANCES[name].form.format
+    counted = RateTest(one.touches, SEED, MOST)
+    off, lost = one.first(lambda value: one.off(value) > WITHIN), one.first(lambda value: not counted(value).right)
+    limits = (form(value) if value is not None else f"above {form(one.tried[1])}" for value in (off, lost))
+    there, right = f"{one.off(one.expected):.2f}", counted(one.expected).rate
+    return [name, form(one.expected), there, next(limits), right, next(limits), one.told]
 
 
 def breaks_table() -> str:
