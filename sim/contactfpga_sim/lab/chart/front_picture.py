@@ -171,7 +171,7 @@ def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool
         axes.plot([at.late_ms] * 2, [at.low, at.high], color=row.color, lw=0.8, alpha=0.5)
         axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
         axes.plot(at.late_ms, at.mean, "_", color=row.color, ms=7, zorder=3)
-        if words:
+        if words and word:
             spot = row.others.get(word, row.spot)
             side = "left" if spot[0] > 0 else "right" if spot[0] else "center"
             place = {"xytext": spot, "textcoords": "offset points", "ha": side, "va": "center"}
