@@ -1,8 +1,9 @@
 """The benchmark: its scorer beside scipy, files of strangers, scenes beside the models that they are of, and the page's
-example. No other test kills a pairing that is not the least, a size that is not checked, and places from the first cell
-in place of the sheet's corner."""
+example. No other test kills a pairing that is not the least, a size that is not checked, places from the first cell in
+place of the sheet's corner, and a least error that is not that of the likelihood."""
 
 import csv
+import dataclasses
 import io
 import itertools
 import math
@@ -19,7 +20,7 @@ from scipy.optimize import linear_sum_assignment
 
 from contactfpga.tools import cli
 from contactfpga_sim.apps import score, stats
-from contactfpga_sim.lab.benchmark import entries, scenes
+from contactfpga_sim.lab.benchmark import bounds, entries, scenes
 from contactfpga_sim.lab.benchmark.scenes import PITCHES_MM, Work
 from contactfpga_sim.lab.chart import front_picture
 
@@ -202,3 +203,28 @@ def test_the_command_scores_and_draws_entries_of_others(folder, mine, tmp_path, 
     np.savez(tmp_path / "mine.npz", **mine | {"name": np.array("OpenCV")})
     assert cli.main(["study", "benchmark", *given]) == 1
     assert "two entries have the name 'OpenCV'" in capsys.readouterr().err
+
+
+# ---- the least error
+
+
+def test_the_estimate_is_the_mean_of_the_place():
+    """Of a narrow likelihood, of one that is even, and of one that is cut by the pitch."""
+    half = entries.KITS_MM / 2
+    narrow = bounds.estimate(lambda x, y: -((x - 1.3) ** 2 + (y + 2.1) ** 2) / 2 / 0.05**2)
+    assert narrow == pytest.approx([1.3, -2.1], abs=0.02)
+    assert bounds.estimate(lambda x, y: 0.0) == pytest.approx([0, 0], abs=1e-9)
+    assert bounds.estimate(lambda x, y: 0.0 if x > 0 else -99.0) == pytest.approx([half / 2, 0], abs=0.2)
+
+
+@pytest.mark.slow
+def test_the_least_error_goes_with_the_spread_of_the_domes(monkeypatch):
+    """Domes that close at a known force tell the place, by their moments to a tenth of a millimeter; and a frame tells
+    less than all moments."""
+    touch, off = bounds.Touch("bumper", 2), []
+    for spread in (0.005, 0.1):
+        monkeypatch.setattr(bounds, "DOME", dataclasses.replace(bounds.DOME, spread=spread))
+        off.append(np.mean([touch.off_mm(np.random.default_rng(seed)) for seed in range(2)], axis=0))
+    (known, exact), (frame, closings) = off
+    assert exact < 0.1 < closings < frame < entries.KITS_MM / 2
+    assert known < frame

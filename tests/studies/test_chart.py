@@ -320,6 +320,10 @@ def test_the_picture_of_the_front_has_its_entries_where_their_scores_say():
                 assert left < x < right
                 assert y < top
     assert sum(len(axes.texts) - 1 for axes in figure.axes) <= 20
-    (ring,) = (line for line in figure.axes[0].lines if line.get_markersize() > 10)
-    kits = [line for line in lines if line["entry"] == "domes, 6.4 mm" and line["family"] != "all"]
-    assert ring.get_ydata()[0] == pytest.approx(100 * max(float(line["wrong"]) for line in kits))
+    rings = [line.get_ydata()[0] for line in figure.axes[0].lines if line.get_markersize() > 10]
+    for ring, entry in zip(rings, ("domes, 6.4 mm", "soft kit"), strict=True):
+        kit = [line for line in lines if line["entry"] == entry and line["family"] != "all"]
+        assert ring == pytest.approx(100 * max(float(line["wrong"]) for line in kit))
+    walls = [float(line["place_mm"]) for line in lines if line["kind"] == "bound"]
+    drawn = [line.get_ydata()[0] for line in figure.axes[1].lines if line.get_linestyle() == "--"]
+    assert drawn == pytest.approx([max(walls[:3]), max(walls[3:])])

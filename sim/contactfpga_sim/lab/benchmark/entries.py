@@ -94,7 +94,8 @@ LIGHT_US, LIGHT_N = 22.0, 0.2
 KITS_MM = 6.4
 ONE_N = (0.07, 0.1, 0.2, 0.4)
 THREE_N = ((0.05, 0.2, 0.8), (0.07, 0.28, 1.13), (0.1, 0.4, 1.6), (0.2, 1.6, 3.2))
-"""The kits' pitch, and by pitch the best one level and three levels."""
+SOFT, SOFT_N = "soft kit", (0.13, 0.53, 1.74)
+"""The kits' pitch; the best one level and three levels by pitch; the entry with the levels of the soft kit."""
 
 
 class Method(NamedTuple):
@@ -135,6 +136,7 @@ def _methods() -> dict[str, Method]:
         found[f"one level, {pitch:g} mm"] = light(pitch, (one,))
         found[f"three levels, {pitch:g} mm"] = light(pitch, three, 2)
     return found | {
+        SOFT: light(KITS_MM, SOFT_N, 2),
         "analog array": Method("model", KITS_MM, DOME.force_n, analog, array),
         "microcontroller": _of_domes("model", KITS_MM, mcu),
         "OpenCV": _of_domes("model", KITS_MM, Pace(scan_us, 0.0, BYTE_US * (FRAME + math.ceil(cells / 8)))),

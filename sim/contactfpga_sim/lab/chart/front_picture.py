@@ -21,8 +21,8 @@ from contactfpga import picture_style as style
 WIDTH_IN = 390 / 96
 """Width of a phone, where the picture fits."""
 
-KITS = "domes, 6.4 mm"
-"""The entry with the design of the starter and the fast kit."""
+KITS = ("domes, 6.4 mm", "soft kit")
+"""Entries with the design of the starter and the fast kit, and with the soft kit's levels."""
 
 
 Offset = tuple[float, float]
@@ -55,6 +55,7 @@ ROWS = {
     ),
     "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level"), others={"4": (-5, -4)}),
     "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10)}),
+    "three levels of the soft kit": Row(style.VERMILLION, "s", {"soft": "soft kit"}, (-10, 0)),
     "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (-2, -10)),
     "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (1, -20)),
 }
@@ -72,13 +73,14 @@ class Panel(NamedTuple):
 
 PANELS = (
     Panel("scenes with a wrong count, %", "wrong", 100.0, (2, 5, 10, 20, 50, 100), (1.5, 150)),
-    Panel("error of place, mm", "place_mm", 1.0, (0.2, 0.5, 1, 2, 5), (0.2, 6)),
+    Panel("error of place, mm", "place_mm", 1.0, (0.1, 0.2, 0.5, 1, 2, 5), (0.1, 6)),
 )
 TICKS_MS, ENDS_MS = (5, 10, 20, 30), (5, 36)
 BITS_MS = 19 * 10 / 3e3
 """Milliseconds that the bits of the shortest frame with a zone need at 3 Mbaud."""
 
 
+WALL = {"ha": "right", "va": "top", "fontsize": style.SMALL}
 ENOUGH = 30
 """Scenes with a right count from which a family's error of place counts."""
 
@@ -115,6 +117,11 @@ def placed(lines: Lines, panel: Panel) -> Spot:
     return Spot(late, *(max(one, panel.ends[0]) for one in found))  # which also stands for none
 
 
+def bound(lines: Lines) -> bool:
+    """Whether these scores are a least error of any method, which has no time."""
+    return lines[0]["kind"] == "bound"
+
+
 def save(scores: Path, path: Path) -> Path:
     """Draw scores as :func:`contactfpga_sim.apps.score.write` writes them; equal scores give equal files."""
     with open(scores, newline="", encoding="utf-8") as file, matplotlib.rc_context(style.SETTINGS):
@@ -126,19 +133,23 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
     for line in lines:
         by.setdefault(line["entry"], []).append(line)
     ours = {entry for row in ROWS.values() for entry in row.entries.values()}
-    foreign = FOREIGN._replace(entries={entry: entry for entry in by if entry not in ours})
+    foreign = FOREIGN._replace(entries={entry: entry for entry in by if entry not in ours and not bound(by[entry])})
     figure = style.new(8.2, WIDTH_IN)
     for axes, panel in zip(figure.subplots(2, 1, sharex=True), PANELS, strict=True):
         _axes(axes, panel)
         for row in (*ROWS.values(), foreign):
             _row(axes, panel, row, by, words=panel is PANELS[0] or row is foreign)
-        at = placed(by[KITS], panel)
-        axes.plot(at.late_ms, at.worst, "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
+        for at in (placed(by[kit], panel) for kit in KITS if kit in by):
+            axes.plot(at.late_ms, at.worst, "o", ms=13, mfc="none", mec=style.INK, mew=1.2, zorder=6, clip_on=False)
+        for entry in filter(lambda entry: panel is PANELS[1] and bound(by[entry]), by):
+            least = max(float(line[panel.field]) for line in by[entry])
+            axes.axhline(least, color=style.SOFT, ls="--", lw=1)
+            axes.text(0.99, least, f"{entry}: {least:.2f} mm", **WALL, transform=axes.get_yaxis_transform())
     axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
     marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
     marks += [Line2D([], [], color=style.INK, marker="o", mfc="none", ls="", ms=11)]
-    words = [*ROWS, "below a mark: the mean of all families", "the starter and the fast kit"]
+    words = [*ROWS, "below a mark: the mean of all families", "the kits: starter and fast, and soft"]
     figure.legend(marks, words, loc="outside lower left", ncols=1)
     return figure
 
@@ -160,7 +171,7 @@ def _row(axes: Any, panel: Panel, row: Row, by: Mapping[str, Lines], words: bool
         axes.plot([at.late_ms] * 2, [at.low, at.high], color=row.color, lw=0.8, alpha=0.5)
         axes.plot(at.late_ms, at.worst, row.mark, color=row.color, ms=6, mew=0, zorder=3)
         axes.plot(at.late_ms, at.mean, "_", color=row.color, ms=7, zorder=3)
-        if words:
+        if words and word:
             spot = row.others.get(word, row.spot)
             side = "left" if spot[0] > 0 else "right" if spot[0] else "center"
             place = {"xytext": spot, "textcoords": "offset points", "ha": side, "va": "center"}

@@ -19,7 +19,7 @@ from contactfpga_sim.apps import pool, result_cache, score
 from contactfpga_sim.apps.covers import sheet
 from contactfpga_sim.apps.light import Reading, Sensed
 from contactfpga_sim.apps.score import MODELS, Entry, Interval, Scores
-from contactfpga_sim.lab.benchmark import entries, scenes
+from contactfpga_sim.lab.benchmark import bounds, entries, scenes
 from contactfpga_sim.lab.benchmark.pressed import Pressed
 from contactfpga_sim.lab.benchmark.scenes import Work
 
@@ -119,6 +119,7 @@ class Found(NamedTuple):
     """For each pitch the best reading of one to :data:`MOST` levels, by pitch and number of levels."""
     entries: list[tuple[Entry, Scores]]
     """The benchmark's own entries."""
+    bounds: list[tuple[Entry, Scores]]
 
 
 def compute() -> Found:
@@ -128,7 +129,7 @@ def compute() -> Found:
         designs = [(pitch, reading) for pitch, readings in best.items() for reading in readings]
         methods = {str(one): entries.light(one[0], one[1].forces_n, one[1].lasts) for one in designs}
         found = entries.judged({**methods, **entries.METHODS}, Path(name), workers)
-        return Found([Judged(*one, found.pop(0)[1]) for one in designs], found)
+        return Found([Judged(*one, found.pop(0)[1]) for one in designs], found, bounds.least(workers))
 
 
 def fitted(pitch_mm: float, workers: Executor) -> tuple[Reading, ...]:

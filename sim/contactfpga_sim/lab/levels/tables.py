@@ -21,7 +21,7 @@ SCORES = Path("docs/chart/benchmark.csv")
 
 def compute() -> Found:
     found = study()
-    score.write(SCORES, found.entries)
+    score.write(SCORES, [*found.entries, *found.bounds])
     return found
 
 
@@ -45,7 +45,7 @@ def entries_table(found: Found) -> writer.Table:
         late = f"{1e3 * every.median_s.mean:.1f} / {1e3 * every.late_s.mean:.1f} ms"
         named = f"{entry.name} (model)" if entry.kind == "model" else entry.name
         rows.append([named, *shares, f"{every.place_mm.mean:.2f} mm", late.replace("inf", "never")])
-    shown = (front_picture.KITS, "three levels, 5 mm", "three levels, 6.4 mm", "one level, 5 mm")
+    shown = (*front_picture.KITS, "three levels, 5 mm", "three levels, 6.4 mm", "one level, 5 mm")
     return writer.Table(
         head,
         rows,
