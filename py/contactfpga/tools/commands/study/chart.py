@@ -30,7 +30,7 @@ def add_flags(flag: flags.Flags) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.apps import pool
-    from contactfpga_sim.lab.chart import host, picture, times_picture
+    from contactfpga_sim.lab.chart import host, times_picture
     from contactfpga_sim.lab.chart import numbers as table
     from contactfpga_sim.lab.chart.compute import study
     from contactfpga_sim.lab.chart.methods import Method
@@ -47,10 +47,7 @@ def run(args: argparse.Namespace) -> int:
     table.write(map(host.timed, points), path)
     print(path, flush=True)
     points = table.read(path, {task.method: Method(task.skin, task.cover) for task in tasks})
-    picture.save(points, folder)
-    times_picture.save(points, folder / "times.svg")
-    for name in ("chart.png", "chart.svg", "times.svg"):
-        print(folder / name)
+    print(times_picture.save(points, folder / "times.svg"))
     return 0
 
 
