@@ -45,7 +45,8 @@ force_n = {DOME.force_n}
 travel_m = 0.0
 spread = {DOME.spread}
 """
-RING_M, SIGMA_N, STEP_N = 0.05, 0.5, 0.2
+RING_M, SIGMA_N, STEP_N = 0.05, 0.5, 0.4
+"""Radius of the pressure units' ring, their noise, and a step of their readings, of which they have 2,000 either way."""
 
 
 def write_robot(folder: Path, names: Sequence[str], units: bool) -> Path:
