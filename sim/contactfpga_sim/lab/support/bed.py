@@ -7,6 +7,7 @@ from the depth of the thing there, along the sheet's normal, and MuJoCo takes th
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from contactfpga.design.cover import Switch
 from contactfpga.design.cover.press import SOLID
@@ -24,6 +26,8 @@ from contactfpga.skin import Skin
 from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps.covers import DOME, FOAM_M, GAP_MM, tiled
 
+Indexes = slice | NDArray[np.intp]
+ALL = slice(None)
 PITCH_MM, LINES = 6.4, 32
 COVER = tiled(PITCH_MM, Switch(DOME.force_n, travel_m=0.0, spread=DOME.spread))
 """The second design of :mod:`contactfpga_sim.lab.support.compute`."""
@@ -46,7 +50,7 @@ travel_m = 0.0
 spread = {DOME.spread}
 """
 RING_M, SIGMA_N, STEP_N = 0.05, 0.5, 0.4
-"""Radius of the pressure units' ring, their noise, and a step of their readings, of which they have 2,000 either way."""
+"""Radius of the ring of pressure units, their noise, and a step of their readings, which have 2,000 either way."""
 
 
 def write_robot(folder: Path, names: Sequence[str], units: bool) -> Path:
@@ -135,17 +139,23 @@ class Bed:
         """Forget all other places, by (n,) bool."""
         self.points_m, self.normals, self.cell = self.points_m[near], self.normals[near], self.cell[near]
 
-    def cells_n(self, forces_n: Floats) -> Floats:
-        """(rows, columns) force on each cell, of (n,) forces at the places."""
-        shape = self.plan.skin.rows, self.plan.skin.columns
-        return np.asarray(np.bincount(self.cell, forces_n, math.prod(shape)).reshape(shape), float)
+    @functools.cached_property
+    def tips_m(self) -> Floats:
+        """(n, 3): where the foam ends that is not pressed."""
+        return np.asarray(self.points_m + FOAM_M * self.normals)
 
-    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats) -> Floats:
-        """(n,): the depth at each place, of a link at this pose in the world."""
-        found = np.zeros(len(self.points_m))
+    def cells_n(self, forces_n: Floats, at: Indexes = ALL) -> Floats:
+        """(rows, columns) force on each cell, of (n,) forces at these places."""
+        shape = self.plan.skin.rows, self.plan.skin.columns
+        return np.asarray(np.bincount(self.cell[at], forces_n, math.prod(shape)).reshape(shape), float)
+
+    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats, at: Indexes = ALL) -> Floats:
+        """(n,): the depth at these places, of a link at this pose in the world."""
+        points, normals = self.points_m[at], self.normals[at]
+        found = np.zeros(len(points))
         for one in things:
             own = Thing(one.half_m, rotation.T @ one.rotation, rotation.T @ (one.point_m - position_m))
-            found = np.maximum(found, own.depth_m(self.points_m, self.normals, FOAM_M))
+            found = np.maximum(found, own.depth_m(points, normals, FOAM_M))
         return found
 
     def forces_n(self, depths_m: Floats) -> Floats:

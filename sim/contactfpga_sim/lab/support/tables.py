@@ -110,13 +110,17 @@ def _components(hits: Sequence[bool]) -> str:
 
 
 def braces_table(found: dict[str, list[float]] | None = None) -> str:
-    """The push that half of the robots stand, by way, the worst first."""
+    """The push that half of the robots stand, by way, the worst first, and the same seeds beside one another."""
     found = brace.survive_all() if found is None else found
-    rows = [["force may act", "impulse that half of them stand, Ns", "a quarter", "fall without a push"]]
+    bare = np.array(found["without skin"])
+    away = np.arange(len(bare)) % brace.PUSHES < len(brace.POINTS_M)  # of the first direction
+    head = ["force may act", "half stand, Ns", "a quarter", "half, away from the arm", "half, straight or toward it"]
+    rows = [[*head, "more than without skin", "less", "fall without a push"]]
     for way, stood in sorted(found.items(), key=lambda item: float(np.median(item[1]))):
-        half, least = (quantile(stood, share) for share in (0.5, 0.25))
-        cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in (half, least))
-        rows.append([way, *cells, f"{sum(one < 0 for one in stood)} of {len(stood)}"])
+        mine = np.array(stood)
+        parts = quantile(mine, 0.5), quantile(mine, 0.25), quantile(mine[away], 0.5), quantile(mine[~away], 0.5)
+        cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in parts)
+        rows.append([way, *cells, *(f"{each.sum()} of {len(mine)}" for each in (mine > bare, mine < bare, mine < 0))])
     return writer.table_of(rows)
 
 
