@@ -53,9 +53,8 @@ class Stage:
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
         self._surfaces: ContactSurfaces | None = None
-        if sheet.extent or sheet.report == "cells":
-            with contextlib.suppress(BodyError):  # under a cover too stiff, no polygon holds a contact
-                self._surfaces = ContactSurfaces(sheet, cover, surface=tiles.surface)
+        with contextlib.suppress(BodyError):  # under a cover too stiff, no polygon holds a contact
+            self._surfaces = ContactSurfaces(sheet, cover, surface=tiles.surface)
         self.limb = Limb(server, tiles, node) if carried and sheet.closed else None
         under_mm = 0.0 if self.limb is None else FOAM_MM
         self._lift_mm = under_mm + 0.06 * self._pitch_mm
@@ -106,7 +105,7 @@ class Stage:
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
         rims = found.circles
         if self._surfaces is not None:
-            with contextlib.suppress(BodyError):  # the board could not follow this frame
+            with contextlib.suppress(BodyError):  # neither cells nor extents came
                 rims = picture.outlines(self._surfaces.supports(zones), self._lift_mm)
         self._draw_lines("rims", rims, picture.CIRCLE, 3.0)
         self._draw_points(found.points)

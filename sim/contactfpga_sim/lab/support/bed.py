@@ -7,7 +7,6 @@ from the depth of the thing there, along the sheet's normal, and MuJoCo takes th
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -16,7 +15,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from contactfpga.design.cover import Switch
 from contactfpga.design.cover.press import SOLID
@@ -26,8 +24,6 @@ from contactfpga.skin import Skin
 from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps.covers import DOME, FOAM_M, GAP_MM, tiled
 
-Indexes = slice | NDArray[np.intp]
-ALL = slice(None)
 PITCH_MM, LINES = 6.4, 32
 COVER = tiled(PITCH_MM, Switch(DOME.force_n, travel_m=0.0, spread=DOME.spread))
 """The second design of :mod:`contactfpga_sim.lab.support.compute`."""
@@ -139,17 +135,12 @@ class Bed:
         """Forget all other places, by (n,) bool."""
         self.points_m, self.normals, self.cell = self.points_m[near], self.normals[near], self.cell[near]
 
-    @functools.cached_property
-    def tips_m(self) -> Floats:
-        """(n, 3): where the foam ends that is not pressed."""
-        return np.asarray(self.points_m + FOAM_M * self.normals)
-
-    def cells_n(self, forces_n: Floats, at: Indexes = ALL) -> Floats:
+    def cells_n(self, forces_n: Floats, at: Any = slice(None)) -> Floats:
         """(rows, columns) force on each cell, of (n,) forces at these places."""
         shape = self.plan.skin.rows, self.plan.skin.columns
         return np.asarray(np.bincount(self.cell[at], forces_n, math.prod(shape)).reshape(shape), float)
 
-    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats, at: Indexes = ALL) -> Floats:
+    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats, at: Any = slice(None)) -> Floats:
         """(n,): the depth at these places, of a link at this pose in the world."""
         points, normals = self.points_m[at], self.normals[at]
         found = np.zeros(len(points))

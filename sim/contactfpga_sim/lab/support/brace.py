@@ -13,7 +13,6 @@ import itertools
 import math
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -26,7 +25,7 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.body.folding import frame_of
 from contactfpga_sim.lab.support import compute
-from contactfpga_sim.lab.support.bed import COVER, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
+from contactfpga_sim.lab.support.bed import COVER, FOAM_M, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
 
 WAYS = ("without skin", "barycenter", "rectangle", "polygon")
 DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0.4))
@@ -101,6 +100,7 @@ class Braced:
         self.closes_n = Cells(COVER, self.lines, self.lines, 1e-3 * PITCH_MM, 1e-3 * PITCH_MM, seed).thresholds_n
         self.cells = np.zeros((self.lines, self.lines), bool)
         self.slid_m = np.zeros((len(self.bed.points_m), 3))
+        self.tips_m = self.bed.points_m + FOAM_M * self.bed.normals
         self.top_m = float(self.link.xpos[2]) - 1e-3 * LINKS["forearm"][1] + 5e-4
         self.thing = self._table(rng)
         middle = 1e-3 * (self.lines - 1) / 2 * PITCH_MM
@@ -134,7 +134,7 @@ class Braced:
     def press(self) -> None:
         """Push the forearm by the bed and by friction, and close the cells."""
         bed, rotation = self.bed, self.link.xmat.reshape(3, 3)
-        near = np.flatnonzero(bed.tips_m @ rotation[2] + self.link.xpos[2] < self.top_m)
+        near = np.flatnonzero(self.tips_m @ rotation[2] + self.link.xpos[2] < self.top_m)
         force = bed.forces_n(bed.depths_m([self.thing], self.link.xpos, rotation, near))
         at, force = near[force > 0], force[force > 0]
         arms, normals = bed.points_m[at] @ rotation.T, bed.normals[at] @ rotation.T
@@ -219,16 +219,11 @@ class Braced:
         return True
 
 
-class Robot(NamedTuple):
-    way: str
-    seed: int
-
-
-def survived(robot: Robot) -> float:
+def survived(way: str, seed: int) -> float:
     """The largest of :data:`IMPULSES_NS` that this robot stands, by halving: it falls at all that are larger than one
     at which it falls. -1 if it does not stand at all."""
-    direction, point = list(itertools.product(DIRECTIONS_DEG, POINTS_M))[robot.seed % PUSHES]
-    braced, low, high = Braced(*robot), -1, len(IMPULSES_NS)
+    direction, point = list(itertools.product(DIRECTIONS_DEG, POINTS_M))[seed % PUSHES]
+    braced, low, high = Braced(way, seed), -1, len(IMPULSES_NS)
     while high - low > 1:
         middle = (low + high) // 2
         stands = braced.stands(IMPULSES_NS[middle], direction, point)
@@ -238,7 +233,7 @@ def survived(robot: Robot) -> float:
 
 def survive_all() -> dict[str, list[float]]:
     """:func:`survived` of all seeds by way."""
-    robots = [Robot(way, seed) for way in WAYS for seed in range(SEEDS)]
+    robots = itertools.product(WAYS, range(SEEDS))
     with pool.executor() as workers:
-        found = iter(list(workers.map(survived, robots)))
+        found = iter(list(workers.map(survived, *zip(*robots))))
     return {way: [next(found) for _ in range(SEEDS)] for way in WAYS}

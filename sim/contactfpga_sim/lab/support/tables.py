@@ -118,7 +118,8 @@ def braces_table(found: dict[str, list[float]] | None = None) -> str:
     rows = [[*head, "more than without skin", "less", "fall without a push"]]
     for way, stood in sorted(found.items(), key=lambda item: float(np.median(item[1]))):
         mine = np.array(stood)
-        parts = quantile(mine, 0.5), quantile(mine, 0.25), quantile(mine[away], 0.5), quantile(mine[~away], 0.5)
+        asked = (mine, 0.5), (mine, 0.25), (mine[away], 0.5), (mine[~away], 0.5)
+        parts = (quantile(each.tolist(), share) for each, share in asked)
         cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in parts)
         rows.append([way, *cells, *(f"{each.sum()} of {len(mine)}" for each in (mine > bare, mine < bare, mine < 0))])
     return writer.table_of(rows)
