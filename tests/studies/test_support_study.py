@@ -1,6 +1,7 @@
 """The study of supports on JVRC-1: the bed, the way to the driver, and the plant of the brace. No other test kills foam
 that is pressed beside a thing or too deep, a polygon that is laid flat on the wrong side of a link, a wrench that is
-judged by the wrong cells, a table that pushes without friction or sideways, and a push that nothing resists."""
+judged by the wrong cells, a table that pushes without friction or sideways, a push that nothing resists, and an arm
+whose limits turn its force."""
 
 import dataclasses
 import math

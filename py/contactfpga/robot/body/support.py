@@ -252,11 +252,12 @@ class ContactSurfaces:
         if forces is not None and (forces.wrench.saturated or forces.wrench.lifted):
             forces = None
         flat = [polygons.within(polygons.grown(middles, *self._grown), self._edges) for middles, _ in cells]
+        boxes = np.array([(*np.min(one, axis=0), *np.max(one, axis=0)) for one in flat])
         alone = forces.wrench if forces is not None and len(zones) == 1 else None
         center = None if alone is None or outside is None else outside.center(alone)
         found = []
         for number, (zone, corners, (middles, why)) in enumerate(zip(zones, flat, cells)):
-            region, doubts = corners, [*why, *self._neighbors(number, flat), *of_units]
+            region, doubts = corners, [*why, *self._neighbors(number, boxes), *of_units]
             if center is not None and outside is not None:
                 middle = self._flat(center.point_m)
                 if center.covariance_m2 is not None:
@@ -339,11 +340,10 @@ class ContactSurfaces:
             doubts.append("it may be a ghost: the sheet has no diodes")
         return [(x * self._pitch[0], y * self._pitch[1]) for x, y in corners], doubts
 
-    def _neighbors(self, number: int, flat: list[list[Point]]) -> list[str]:
-        """Which other polygons are less than a pitch away along x and y."""
-        if len(flat) == 1:
+    def _neighbors(self, number: int, boxes: Floats) -> list[str]:
+        """Which other polygons are less than a pitch away along x and y, by the (n, 4) boxes of all."""
+        if len(boxes) == 1:
             return []
-        boxes = np.array([(*np.min(one, axis=0), *np.max(one, axis=0)) for one in flat])
         gap = np.maximum(boxes[:, :2] - boxes[number, 2:], boxes[number, :2] - boxes[:, 2:])
         if (around := self.sheet.around_mm) is not None:
             wide = boxes[:, 2] - boxes[:, 0]
