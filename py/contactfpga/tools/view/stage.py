@@ -174,7 +174,7 @@ class Stage:
             f"{self._node}/barycenters",
             points,
             picture.CIRCLE,
-            point_size=0.18 * self._pitch_mm * MM,
+            point_size=(0.18 if self._glow is not None else 0.5) * self._pitch_mm * MM,  # robots are seen from afar
             point_shape="circle",
             precision="float32",
         )

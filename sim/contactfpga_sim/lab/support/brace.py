@@ -33,7 +33,7 @@ DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0
 is the left one, so that the first direction is away from it."""
 PUSHES = len(DIRECTIONS_DEG) * len(POINTS_M)
 IMPULSES_NS = tuple(10.0 * number for number in range(16))
-SEEDS = 63
+SEEDS = 45
 """Robots on a table or a rail of their own; each direction and point has as many."""
 
 STEP_S, CONTROL_STEPS = 2e-3, 5

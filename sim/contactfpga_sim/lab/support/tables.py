@@ -110,18 +110,20 @@ def _components(hits: Sequence[bool]) -> str:
 
 
 def braces_table(found: dict[str, list[float]] | None = None) -> str:
-    """The push that half of the robots stand, by way, the worst first, and the same seeds beside one another."""
+    """The push that half of the robots stand, by way, the worst first; by direction also how many stand more and less
+    than the same robots without skin."""
     found = brace.survive_all() if found is None else found
     bare = np.array(found["without skin"])
     away = np.arange(len(bare)) % brace.PUSHES < len(brace.POINTS_M)  # of the first direction
-    head = ["force may act", "half stand, Ns", "a quarter", "half, away from the arm", "half, straight or toward it"]
-    rows = [[*head, "more than without skin", "less", "fall without a push"]]
+    head = ["force may act", "all pushes, Ns", "away from the arm", "more, less", "straight or toward it", "more, less"]
+    rows = [[*head, "fall without a push"]]
     for way, stood in sorted(found.items(), key=lambda item: float(np.median(item[1]))):
-        mine = np.array(stood)
-        asked = (mine, 0.5), (mine, 0.25), (mine[away], 0.5), (mine[~away], 0.5)
-        parts = (quantile(each.tolist(), share) for each, share in asked)
-        cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in parts)
-        rows.append([way, *cells, *(f"{each.sum()} of {len(mine)}" for each in (mine > bare, mine < bare, mine < 0))])
+        mine, cells = np.array(stood), []
+        for some in (away | True, away, ~away):
+            half = quantile(mine[some].tolist(), 0.5)
+            cells += [f"{half.value:.0f} ({half.low:.0f} to {half.high:.0f})"]
+            cells += [f"{(mine > bare)[some].sum()}, {(mine < bare)[some].sum()} of {some.sum()}"]
+        rows.append([way, cells[0], *cells[2:], f"{(mine < 0).sum()} of {len(mine)}"])
     return writer.table_of(rows)
 
 
