@@ -122,8 +122,7 @@ def test_what_is_doubtful_is_said():
 def test_center_and_wrench_lie_in_region_and_interval_as_often_as_stated(rng, sigma_m):
     """30 N press straight down within two cells, on units with noise and on a link that is turned. As the forces'
     place has this standard deviation, they fit nearly always, or nearly never."""
-    skin, draw, hits = Skin(report="cells"), np.random.default_rng(rng.getrandbits(32)), []
-    alarms = []
+    skin, draw, hits, alarms = Skin(report="cells"), np.random.default_rng(rng.getrandbits(32)), [], []
     pose, force = Pose.of((0.3, -0.2, 0.5), (0.4, -0.8, 1.1)), np.array([0, 0, -30.0])
     cells = np.zeros((16, 16), bool)
     cells[5, 5:7] = True
