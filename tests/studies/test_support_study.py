@@ -1,6 +1,7 @@
 """The study of supports on JVRC-1: the bed, the way to the driver, and the plant of the brace. No other test kills foam
 that is pressed beside a thing or too deep, a polygon that is laid flat on the wrong side of a link, a wrench that is
-judged by the wrong cells, a table that pushes without friction or sideways, and a push that nothing resists."""
+judged by the wrong cells, a table that pushes without friction or sideways, a push that nothing resists, and an arm
+whose limits turn its force."""
 
 import dataclasses
 import math
@@ -91,6 +92,7 @@ def test_without_its_arm_the_robot_falls_and_a_huge_push_fells_it(monkeypatch):
 def test_forces_act_where_the_way_says(way):
     """All lie on the forearm; the skin's on what it feels, and the rectangle holds the polygon."""
     braced = brace.Braced(way, 1)
+    braced.cells[:] = False
     braced.cells[8:12, 15:18] = True
     braced.cells[8, 15] = braced.cells[11, 17] = False
     flat = (braced.places() - braced.plan.pose.point_m) @ braced.plan.pose.rotation
@@ -111,7 +113,26 @@ def test_forces_act_where_the_way_says(way):
     assert len(braced.places()) == (4 if way == "without skin" else 0)
 
 
-def test_the_table_of_braces_has_the_worst_way_first():
-    text = braces_table({"good": [80.0] * 9, "bad": [-1.0, *[30.0] * 8]})
-    assert text.index("| bad | 30 ") < text.index("| good | 80 ")
-    assert "1 of 9" in text
+def test_the_table_of_braces_has_the_worst_way_first_and_compares_seeds():
+    """Of nine pushes the first three are away from the arm."""
+    text = braces_table({"without skin": [50.0] * 9, "polygon": [-1.0, 30.0, 30.0, *[80.0] * 5, 50.0]})
+    assert text.index("| without skin | 50 ") < text.index("| polygon | 80 ")
+    cells = text[text.index("| polygon") :].split(" | ")[1:]
+    assert [cell.split(" (")[0] for cell in cells[:5]] == ["80", "30", "0, 3 of 3", "80", "5, 0 of 6"]
+    assert cells[5].startswith("1 of 9")
+
+
+def test_beyond_the_arms_torques_its_forces_shrink_together(monkeypatch):
+    """Without limits the same forces are asked for, and without a contact none."""
+    braced = brace.Braced("polygon", 1)
+    braced.data.qvel[:2] = 1.5, 0.5
+    cut = braced.control()[2:]
+    monkeypatch.setattr(brace, "ARM_NM", 1e6)
+    asked = braced.control()[2:]
+    braced.cells[:] = False
+    monkeypatch.setattr(brace, "SEARCH_N", 0.0)
+    rest = braced.control()[2:]
+    shares = (cut - rest) / (asked - rest)
+    assert np.abs(cut).max() == pytest.approx(100)
+    assert shares == pytest.approx(np.full(4, shares[0]))
+    assert 0.05 < shares[0] < 0.95

@@ -1,5 +1,6 @@
 """The parts of the view that know no browser: places, fingers, pace, counters, what is drawn."""
 
+import itertools
 import math
 import re
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ from fake_board import wait_until
 from tracker_frames import frame
 
 from contactfpga import Skin
+from contactfpga.body import ContactSurfaces
 from contactfpga.driver import driver
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
@@ -176,16 +178,20 @@ def test_a_circle_has_its_zones_area_and_lies_around_its_barycenter(name):
     assert len(found.circles) == picture.SIDES
 
 
-def test_a_box_is_drawn_along_the_outer_edges_of_its_cells():
-    skin = Skin(extent=True)
+@pytest.mark.parametrize("name", ["plane", "cylinder"])
+def test_a_polygon_is_drawn_half_a_pitch_around_its_cells(name):
+    sheet, surface, lift = Skin(extent=True).sheet, TILES[name].surface, 0.5
     records, extents = np.array([[4, 6, 9]]), np.array([[1, 2, 2, 3]])
-    one = Zones(Frame(0, 0, frozenset(), 0, 0, 1, 4, records, None, extents=extents), skin.sheet)
-    lines = picture.boxes(one, TILES["plane"].surface, 0.0)
-    corners = {(10 * x + 5, 10 * y + 5) for x in (0, 2) for y in (1, 3)}
-    assert corners <= set(map(tuple, np.round(lines[:, 0, :2] * 1000, 6).tolist()))
-    assert np.array_equal(lines[1:, 0], lines[:-1, 1])
-    assert np.allclose(lines[0, 0], lines[-1, 1])
-    assert not len(picture.boxes(frame(0, [(4, 6, 9)]), TILES["plane"].surface, 0.0))
+    one = Zones(Frame(0, 0, frozenset(), 0, 0, 1, 4, records, None, extents=extents), sheet)
+    lines = picture.outlines(ContactSurfaces(sheet, surface=surface).supports(one), lift)
+    assert np.array_equal(lines[:, 1], np.roll(lines[:, 0], -1, axis=0))
+    most_m = 0.031 if name == "plane" else 0.0101  # around a cylinder a point per pitch
+    assert np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).max() < most_m
+    for x, y in itertools.product((0.0, 30.0), (10.0, 40.0)):
+        point, normal = surface.place(x, y)
+        corner = (np.array(point) + lift * np.array(normal)) / 1000
+        assert np.linalg.norm(lines[:, 0] - corner, axis=1).min() < 1e-9
+    assert not len(picture.outlines([], lift))
 
 
 def test_cells_are_colored_by_what_is_known_of_them():

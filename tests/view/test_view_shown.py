@@ -175,7 +175,7 @@ def test_how_often_frames_come_is_said_in_words(frames_per_s, says):
 
 
 def test_the_panel_names_no_color_twice():
-    source = SimpleNamespace(sheet=SimpleNamespace(report="cells", ghosts=True, levels=1), cells=object())
+    source = SimpleNamespace(sheet=SimpleNamespace(report="cells", extent=False, ghosts=True, levels=1), cells=object())
     marks = re.findall(r"color:(#\w+)", panel.legend(source, virtual=True))
     assert len(marks) == len(set(marks)) == 5
 

@@ -286,7 +286,7 @@ _ALL = (
         "support",
         title="Contact surfaces against the contacts that they hold",
         page="support.md",
-        minutes=5,
+        minutes=4,
         sections=tables("surfaces leans braces"),
         compute="compute:compute",
         pictures="tables:draw",

@@ -66,7 +66,8 @@ class Support:
     doubts: tuple[str, ...]
     """Reasons why the polygon may hold more or less than one contact; () if there is none."""
     felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
-    """The force in the link's frame; None without pressure units, or before their readings arrive."""
+    """The force in the link's frame; None without pressure units, before their readings arrive, or while one of them is
+    at its limit."""
     _pose: Pose | None = dataclasses.field(default=None, repr=False)
     _alone: haptics.Wrench | None = dataclasses.field(default=None, repr=False)
 
@@ -83,9 +84,10 @@ class Support:
         """(6, 2): least and largest component of the wrench on the link, in N and Nm about the frame's origin; None as
         :attr:`felt`.
 
-        Each component of a single zone is within its interval in 95 of 100 cases, by the noise of the units. With
-        several zones it is all that the push in its interval, any friction within the cone and a center of pressure in
-        :attr:`region_m` exert.
+        A single zone has the wrench of all that presses on the link, each component of which is within its interval in
+        95 of 100 cases, by the noise of the units; :attr:`doubts` say if that may be more than this zone. With several
+        zones it is all that the push in its interval, any friction within the cone and a center of pressure in
+        :attr:`region_m` exert, which holds more often: the units measure one wrench and not how the zones share it.
         """
         if self.felt is None:
             return None
@@ -246,20 +248,23 @@ class ContactSurfaces:
         weighs them in :attr:`Support.center_m`. Raises :class:`BodyError` if the board sends neither cells nor extents,
         and for a zone without cells.
         """
-        cells = [self._cells(zones, zone) for zone in zones]
+        cells, of_units = [self._cells(zones, zone) for zone in zones], _of_units(forces)
+        if forces is not None and (forces.wrench.saturated or forces.wrench.lifted):
+            forces = None
         flat = [polygons.within(polygons.grown(middles, *self._grown), self._edges) for middles, _ in cells]
-        alone = forces if forces is not None and len(zones) == 1 and not forces.alarm else None
-        center = None if alone is None or outside is None else outside.center(alone.wrench)
+        boxes = np.array([(*np.min(one, axis=0), *np.max(one, axis=0)) for one in flat])
+        alone = forces.wrench if forces is not None and len(zones) == 1 else None
+        center = None if alone is None or outside is None else outside.center(alone)
         found = []
         for number, (zone, corners, (middles, why)) in enumerate(zip(zones, flat, cells)):
-            region, doubts = corners, [*why, *self._neighbors(number, flat), *_of_units(forces)]
+            region, doubts = corners, [*why, *self._neighbors(number, boxes), *of_units]
             if center is not None and outside is not None:
                 middle = self._flat(center.point_m)
                 if center.covariance_m2 is not None:
                     region = polygons.within(corners, self._around(corners, self._ellipse(center, outside)))
                 if not region:
                     doubts.append("by the pressure units the center of pressure lies elsewhere")
-                    region = corners
+                    region, middle = corners, self._barycenter(zones, zone, corners, pressures)
             else:
                 middle = self._barycenter(zones, zone, corners, pressures)
             outlines = [polygons.edges_split(one, self._longest) for one in (corners, region)]
@@ -269,7 +274,7 @@ class ContactSurfaces:
                     *(zone, *self._names, points[0], 1e-6 * polygons.area(corners), points[1], normals[1]),
                     *(points[3][0], points[2], 5e-4 * math.hypot(*self._pitch), tuple(doubts)),
                     None if forces is None else forces[number],
-                    _alone=None if alone is None else alone.wrench,
+                    _alone=alone,
                 )
             )
         return found
@@ -335,11 +340,10 @@ class ContactSurfaces:
             doubts.append("it may be a ghost: the sheet has no diodes")
         return [(x * self._pitch[0], y * self._pitch[1]) for x, y in corners], doubts
 
-    def _neighbors(self, number: int, flat: list[list[Point]]) -> list[str]:
-        """Which other polygons are less than a pitch away along x and y."""
-        if len(flat) == 1:
+    def _neighbors(self, number: int, boxes: Floats) -> list[str]:
+        """Which other polygons are less than a pitch away along x and y, by the (n, 4) boxes of all."""
+        if len(boxes) == 1:
             return []
-        boxes = np.array([(*np.min(one, axis=0), *np.max(one, axis=0)) for one in flat])
         gap = np.maximum(boxes[:, :2] - boxes[number, 2:], boxes[number, :2] - boxes[:, 2:])
         if (around := self.sheet.around_mm) is not None:
             wide = boxes[:, 2] - boxes[:, 0]
@@ -376,7 +380,7 @@ def _of_units(forces: haptics.Contacts | None) -> list[str]:
     if forces is None:
         return []
     limits = forces.wrench.saturated or forces.wrench.lifted
-    found = ["a pressure unit is at its limit: the wrench is wrong"] if limits else []
+    found = ["a pressure unit is at its limit: the force is not known"] if limits else []
     return found + (["the pressure units feel something that the sheet does not show"] if forces.alarm else [])
 
 

@@ -28,6 +28,7 @@ _MARK = '<span style="color:{color}">{mark}</span>'
 ZONES = ("orange", picture_style.VERMILLION, "◯", "a contact: its barycenter, and a circle of its area, not its shape")
 WAY = ("green", picture_style.GREEN, "―", "where its contact was within the last second")
 REPORTED = ("blue", picture_style.BLUE, "■", "pressed cells, as the board reports them")
+POLYGONS = (*ZONES[:2], "⬠", "a contact: its barycenter, and a polygon that holds it")
 LEVELS = (*REPORTED[:3], "pressed cells, as the board reports them; the harder, the bluer")
 GHOSTS = ("yellow", picture_style.ORANGE, "■", "cells that other pressed ones may have made")
 TRUTH = (
@@ -150,8 +151,8 @@ def shortened(title: str) -> str:
 
 
 def legend(source: Source, virtual: bool) -> str:
-    rows = [ZONES, WAY]
     cells = source.sheet.report == "cells"
+    rows = [POLYGONS if cells or source.sheet.extent else ZONES, WAY]
     rows += [REPORTED if source.sheet.levels == 1 else LEVELS] if cells else []
     rows += [GHOSTS] if cells and source.sheet.ghosts else []
     rows += [FORCE] if source.cells is not None else []

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from contactfpga import picture_style
+from contactfpga.robot.body import Support
 from contactfpga.robot.haptics import Contacts, LoadCells
 from contactfpga.surfaces import Surface
 from contactfpga.tools.view.tiles import MM
@@ -86,17 +88,12 @@ def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
     return Spots(points, np.concatenate([_circle(zone, surface, lift_mm) for zone in placed]))
 
 
-def boxes(zones: Zones, surface: Surface, lift_mm: float) -> np.ndarray:
-    """(n, 2, 3) lines in m around the zones' boxes, in short pieces that follow the surface."""
+def outlines(supports: Iterable[Support], lift_mm: float) -> np.ndarray:
+    """(n, 2, 3) lines in m around the polygons of contacts, whose points follow the surface."""
     found = [np.zeros((0, 2, 3))]
-    for zone in zones:
-        if zone.box_mm is not None:
-            x, y, width, height = zone.box_mm
-            side = np.linspace(0, 1, SIDES // 4 + 1)[:-1]
-            along = np.concatenate([side, np.ones_like(side), 1 - side, np.zeros_like(side), [0.0]])
-            down = np.roll(along[:-1], len(side))
-            rim = _lifted(surface, x + width * along, y + height * np.append(down, down[:1]), lift_mm)
-            found.append(np.stack([rim[:-1], rim[1:]], axis=1))
+    for one in supports:
+        rim = one.region_m + lift_mm * MM * one.normals
+        found.append(np.stack([rim, np.roll(rim, -1, axis=0)], axis=1))
     return np.concatenate(found)
 
 

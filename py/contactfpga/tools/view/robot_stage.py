@@ -151,7 +151,7 @@ class RobotStage:
         node = f"{self._node}/{plan.frame}/{plan.name}"
         wxyz = quaternions(plan.pose.rotation[None])[0]
         self._server.scene.add_frame(node, show_axes=False, wxyz=wxyz, position=plan.pose.point_m)
-        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False)
+        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node, carried=False, cover=plan.cover)
 
     def move(self, angles: Mapping[str, float]) -> None:
         kinematics = self._body.kinematics

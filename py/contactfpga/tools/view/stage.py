@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga.design.cover import Cover
+from contactfpga.robot.body import BodyError, ContactSurfaces
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.tools.view import contacts, glow, picture, ruler
 from contactfpga.tools.view.fingers import Hand
@@ -39,8 +42,9 @@ class Stage:
         load_cells: LoadCells | None = None,
         node: str = NODE,
         carried: bool = True,
+        cover: Cover | None = None,
     ):
-        """``carried``: on a limb or a plate, with numbered rows and columns."""
+        """``carried``: on a limb or a plate, with numbered rows and columns. ``cover``: for polygons of contacts."""
         self._load_cells = load_cells
         self._arrows: Any = None
         self.rotation, self.point_m = np.eye(3), np.zeros(3)
@@ -48,6 +52,9 @@ class Stage:
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
+        self._surfaces: ContactSurfaces | None = None
+        with contextlib.suppress(BodyError):  # under a cover too stiff, no polygon holds a contact
+            self._surfaces = ContactSurfaces(sheet, cover, surface=tiles.surface)
         self.limb = Limb(server, tiles, node) if carried and sheet.closed else None
         under_mm = 0.0 if self.limb is None else FOAM_MM
         self._lift_mm = under_mm + 0.06 * self._pitch_mm
@@ -96,8 +103,11 @@ class Stage:
         zones = moment.zones
         self._color(picture.tile_colors(zones, moment.truth))
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
-        self._draw_lines("circles", found.circles, picture.CIRCLE, 3.0)
-        self._draw_lines("boxes", picture.boxes(zones, self.tiles.surface, self._lift_mm), picture.CIRCLE, 1.0)
+        rims = found.circles
+        if self._surfaces is not None:
+            with contextlib.suppress(BodyError):  # neither cells nor extents came
+                rims = picture.outlines(self._surfaces.supports(zones), self._lift_mm)
+        self._draw_lines("rims", rims, picture.CIRCLE, 3.0)
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
@@ -164,7 +174,7 @@ class Stage:
             f"{self._node}/barycenters",
             points,
             picture.CIRCLE,
-            point_size=0.18 * self._pitch_mm * MM,
+            point_size=(0.18 if self._glow is not None else 0.5) * self._pitch_mm * MM,  # robots are seen from afar
             point_shape="circle",
             precision="float32",
         )

@@ -96,7 +96,8 @@ class GoldenBoard:
     def _record(self, zone: Departure) -> int:
         known = self._facts
         fields = [(zone.area, known.area_bits), (zone.sum_x, known.sum_x_bits), (zone.sum_y, known.sum_y_bits)]
-        return join((*fields, *([(zone.turned, known.area_bits)] if known.skin.closed else [])))[0]
+        fields += [(zone.turned, known.area_bits)] if known.skin.closed else []
+        return join((*fields, *zip(zone.extent, known.extent_bits)))[0]
 
     def take(self, boundary: str) -> np.ndarray:
         """Events of ``contact`` or ``received`` since the last call."""

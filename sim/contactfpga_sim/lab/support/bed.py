@@ -45,7 +45,8 @@ force_n = {DOME.force_n}
 travel_m = 0.0
 spread = {DOME.spread}
 """
-RING_M, SIGMA_N, STEP_N = 0.05, 0.5, 0.2
+RING_M, SIGMA_N, STEP_N = 0.05, 0.5, 0.4
+"""Radius of the ring of pressure units, their noise, and a step of their readings, which have 2,000 either way."""
 
 
 def write_robot(folder: Path, names: Sequence[str], units: bool) -> Path:
@@ -134,17 +135,18 @@ class Bed:
         """Forget all other places, by (n,) bool."""
         self.points_m, self.normals, self.cell = self.points_m[near], self.normals[near], self.cell[near]
 
-    def cells_n(self, forces_n: Floats) -> Floats:
-        """(rows, columns) force on each cell, of (n,) forces at the places."""
+    def cells_n(self, forces_n: Floats, at: Any = slice(None)) -> Floats:
+        """(rows, columns) force on each cell, of (n,) forces at these places."""
         shape = self.plan.skin.rows, self.plan.skin.columns
-        return np.asarray(np.bincount(self.cell, forces_n, math.prod(shape)).reshape(shape), float)
+        return np.asarray(np.bincount(self.cell[at], forces_n, math.prod(shape)).reshape(shape), float)
 
-    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats) -> Floats:
-        """(n,): the depth at each place, of a link at this pose in the world."""
-        found = np.zeros(len(self.points_m))
+    def depths_m(self, things: Sequence[Thing], position_m: Floats, rotation: Floats, at: Any = slice(None)) -> Floats:
+        """(n,): the depth at these places, of a link at this pose in the world."""
+        points, normals = self.points_m[at], self.normals[at]
+        found = np.zeros(len(points))
         for one in things:
             own = Thing(one.half_m, rotation.T @ one.rotation, rotation.T @ (one.point_m - position_m))
-            found = np.maximum(found, own.depth_m(self.points_m, self.normals, FOAM_M))
+            found = np.maximum(found, own.depth_m(points, normals, FOAM_M))
         return found
 
     def forces_n(self, depths_m: Floats) -> Floats:

@@ -7,12 +7,12 @@ it out between ankles and forces on the table. The ways differ only in the place
 
 from __future__ import annotations
 
+import copy
 import functools
 import itertools
 import math
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -25,13 +25,15 @@ from contactfpga.surfaces.shapes import Floats
 from contactfpga_sim.apps import pool
 from contactfpga_sim.lab.body.folding import frame_of
 from contactfpga_sim.lab.support import compute
-from contactfpga_sim.lab.support.bed import COVER, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
+from contactfpga_sim.lab.support.bed import COVER, FOAM_M, LINKS, PITCH_MM, Bed, Thing, humanoid, write_robot
 
 WAYS = ("without skin", "barycenter", "rectangle", "polygon")
 DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0.4))
-"""Of the push, to the left of straight ahead, and where it acts on the trunk: y, and z above the waist's joint."""
+"""Of the push, to the left of straight ahead, and where it acts on the trunk: y, and z above the waist's joint. The arm
+is the left one, so that the first direction is away from it."""
+PUSHES = len(DIRECTIONS_DEG) * len(POINTS_M)
 IMPULSES_NS = tuple(10.0 * number for number in range(16))
-SEEDS = 27
+SEEDS = 45
 """Robots on a table or a rail of their own; each direction and point has as many."""
 
 STEP_S, CONTROL_STEPS = 2e-3, 5
@@ -98,12 +100,19 @@ class Braced:
         self.closes_n = Cells(COVER, self.lines, self.lines, 1e-3 * PITCH_MM, 1e-3 * PITCH_MM, seed).thresholds_n
         self.cells = np.zeros((self.lines, self.lines), bool)
         self.slid_m = np.zeros((len(self.bed.points_m), 3))
+        self.tips_m = self.bed.points_m + FOAM_M * self.bed.normals
+        self.top_m = float(self.link.xpos[2]) - 1e-3 * LINKS["forearm"][1] + 5e-4
         self.thing = self._table(rng)
         middle = 1e-3 * (self.lines - 1) / 2 * PITCH_MM
         ends = np.array([[x, y] for x in (-0.01, 0.01) for y in (0.0, 2 * middle)])
         self.planned = np.array([self.plan.place(1e3 * (middle + x), 1e3 * y)[0] for x, y in ends])
         self.known = b"", np.zeros((0, 3))
+        self.surfaces = ContactSurfaces(self.plan.skin.sheet, COVER, surface=self.plan.laid, pose=self.plan.pose)
+        self.linear, self.angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         self.head_m = self._head()
+        for _ in range(round(SETTLED_S / STEP_S)):
+            self._step()
+        self.settled = copy.copy(self.data), self.slid_m.copy()
 
     def _table(self, rng: np.random.Generator) -> Thing:
         """A table whose edge crosses the forearm, or a rail across it, at a random place and angle."""
@@ -113,8 +122,7 @@ class Braced:
         turn = rotation_about((0, 0, 1), rng.uniform(-0.7, 0.7))
         crossing = self.link.xpos + [along - half[0] if edge else along, 0, 0]
         away = turn @ [half[0] if edge else 0.0, 0, 0]
-        top = self.link.xpos[2] - 1e-3 * LINKS["forearm"][1] + 5e-4
-        return Thing(tuple(half.tolist()), turn, np.array([*(crossing + away)[:2], top - half[2]]))
+        return Thing(tuple(half.tolist()), turn, np.array([*(crossing + away)[:2], self.top_m - half[2]]))
 
     def _head(self) -> float:
         """Height of the head above the ankles."""
@@ -126,12 +134,13 @@ class Braced:
     def press(self) -> None:
         """Push the forearm by the bed and by friction, and close the cells."""
         bed, rotation = self.bed, self.link.xmat.reshape(3, 3)
-        force = bed.forces_n(bed.depths_m([self.thing], self.link.xpos, rotation))
-        at = np.flatnonzero(force)
+        near = np.flatnonzero(self.tips_m @ rotation[2] + self.link.xpos[2] < self.top_m)
+        force = bed.forces_n(bed.depths_m([self.thing], self.link.xpos, rotation, near))
+        at, force = near[force > 0], force[force > 0]
         arms, normals = bed.points_m[at] @ rotation.T, bed.normals[at] @ rotation.T
         moves = self.linear @ self.data.qvel + arms @ _turning(self.angular @ self.data.qvel).T
         inward = (moves * normals).sum(axis=1)
-        push = np.maximum(force[at] + FOAM_NS_M * inward, 0.0)
+        push = np.maximum(force + FOAM_NS_M * inward, 0.0)
         aside = moves - inward[:, None] * normals
         slid = self.slid_m[at] + STEP_S * aside
         drag = -BRISTLE_N_M * slid - BRISTLE_NS_M * aside
@@ -143,7 +152,7 @@ class Braced:
         moments = (arms + self.link.xpos - self.link.xipos).T @ each
         turn = moments - moments.T
         self.link.xfrc_applied[:] = [*each.sum(axis=0), turn[1, 2], turn[2, 0], turn[0, 1]]
-        self.cells = bed.cells_n(force) >= self.closes_n
+        self.cells = bed.cells_n(force, at) >= self.closes_n
 
     # ---- the controller
 
@@ -152,10 +161,10 @@ class Braced:
         if self.way == "without skin":
             return self.planned
         if self.cells.tobytes() != self.known[0]:
-            plan, zones = self.plan, frame_of(self.cells, self.plan.skin)
+            zones = frame_of(self.cells, self.plan.skin)
             if self.way == "rectangle":
                 zones = compute.extents_of(self.cells, PITCH_MM)
-            supports = ContactSurfaces(zones.sheet, COVER, surface=plan.laid, pose=plan.pose).supports(zones)
+            supports = self.surfaces.supports(zones)
             found = [one.center_m[None] if self.way == "barycenter" else one.corners_m for one in supports]
             self.known = self.cells.tobytes(), np.concatenate([np.zeros((0, 3)), *found])
         return self.known[1]
@@ -164,7 +173,7 @@ class Braced:
         """(nv,): torques."""
         data, rotation = self.data, self.link.xmat.reshape(3, 3)
         off, bias = self.rest - data.qpos, data.qfrc_bias
-        body = [self.model.joint(name).dofadr[0] for name in ("pitch", "roll")]
+        body, arm = ([self.model.joint(name).dofadr[0] for name in names] for names in (("pitch", "roll"), ARM))
         wanted = bias[body] + BALANCE[0] * off[body] - BALANCE[1] * data.qvel[body]
         places = self.places()
         known = len(places) > 0
@@ -178,52 +187,53 @@ class Braced:
             share, _ = nnls(np.vstack([exerts[body], spread]), np.concatenate([rest, np.zeros(len(spread))]))
         else:
             share = np.full(exerts.shape[1], SEARCH_N / exerts.shape[1])
-        torque = bias + POSTURE[0] * off - POSTURE[1] * data.qvel - exerts @ share
-        torque = np.clip(torque, -ARM_NM, ARM_NM)
-        torque[body] = np.clip(wanted - (exerts @ share)[body], -ANKLE_NM, ANKLE_NM)
+        torque, asked = bias + POSTURE[0] * off - POSTURE[1] * data.qvel, exerts @ share
+        # Beyond the arm's torques all forces shrink together. Cut one by one, the rest would push elsewhere.
+        room = (ARM_NM + np.sign(asked) * torque)[arm] / np.maximum(np.abs(asked[arm]), 1e-9)
+        asked *= np.clip(room.min(), 0.0, 1.0)
+        torque = np.clip(torque - asked, -ARM_NM, ARM_NM)
+        torque[body] = np.clip(wanted - asked[body], -ANKLE_NM, ANKLE_NM)
         return torque
 
-    def stands(self, impulse_ns: float, direction_deg: float, point_m: tuple[float, float]) -> bool:
-        """Whether the robot is upright from the push on until :data:`AFTER_S` after it."""
+    def _step(self) -> None:
         model, data = self.model, self.data
-        trunk, angle = data.body("WAIST_R_S"), math.radians(direction_deg)
+        mujoco.mj_step1(model, data)
+        mujoco.mj_jac(model, data, self.linear, self.angular, self.link.xpos, self.link.id)
+        self.press()
+        if round(data.time / STEP_S) % CONTROL_STEPS == 0:
+            data.qfrc_applied[:] = self.control()
+        mujoco.mj_step2(model, data)
+
+    def stands(self, impulse_ns: float, direction_deg: float, point_m: tuple[float, float]) -> bool:
+        """Whether the robot, once it has settled, is upright from the push on until :data:`AFTER_S` after it."""
+        trunk, angle = self.data.body("WAIST_R_S"), math.radians(direction_deg)
+        mujoco.mj_copyData(self.data, self.model, self.settled[0])
+        self.slid_m[:] = self.settled[1]
         force = impulse_ns / PUSH_S * np.array([math.cos(angle), math.sin(angle), 0.0])
-        self.linear, self.angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        for step in range(round((SETTLED_S + PUSH_S + AFTER_S) / STEP_S)):
-            mujoco.mj_step1(model, data)
-            mujoco.mj_jac(model, data, self.linear, self.angular, self.link.xpos, self.link.id)
-            self.press()
-            if step % CONTROL_STEPS == 0:
-                data.qfrc_applied[:] = self.control()
-            pushed = SETTLED_S <= step * STEP_S < SETTLED_S + PUSH_S
+        for step in range(round((PUSH_S + AFTER_S) / STEP_S)):
             arm = trunk.xmat.reshape(3, 3) @ [0.0, *point_m] + trunk.xpos - trunk.xipos
-            trunk.xfrc_applied[:] = [*force, *np.cross(arm, force)] if pushed else 0.0
-            mujoco.mj_step2(model, data)
+            trunk.xfrc_applied[:] = [*force, *np.cross(arm, force)] if step * STEP_S < PUSH_S else 0.0
+            self._step()
             if not self._head() > UPRIGHT * self.head_m:
                 return False
         return True
 
 
-class Robot(NamedTuple):
-    way: str
-    seed: int
-
-
-def survived(robot: Robot) -> float:
+def survived(way: str, seed: int) -> float:
     """The largest of :data:`IMPULSES_NS` that this robot stands, by halving: it falls at all that are larger than one
     at which it falls. -1 if it does not stand at all."""
-    direction, point = list(itertools.product(DIRECTIONS_DEG, POINTS_M))[robot.seed % 9]
-    low, high = -1, len(IMPULSES_NS)
+    direction, point = list(itertools.product(DIRECTIONS_DEG, POINTS_M))[seed % PUSHES]
+    braced, low, high = Braced(way, seed), -1, len(IMPULSES_NS)
     while high - low > 1:
         middle = (low + high) // 2
-        stands = Braced(*robot).stands(IMPULSES_NS[middle], direction, point)
+        stands = braced.stands(IMPULSES_NS[middle], direction, point)
         low, high = (middle, high) if stands else (low, middle)
     return IMPULSES_NS[low] if low >= 0 else -1.0
 
 
 def survive_all() -> dict[str, list[float]]:
     """:func:`survived` of all seeds by way."""
-    robots = [Robot(way, seed) for way in WAYS for seed in range(SEEDS)]
+    robots = itertools.product(WAYS, range(SEEDS))
     with pool.executor() as workers:
-        found = iter(list(workers.map(survived, robots)))
+        found = iter(list(workers.map(survived, *zip(*robots))))
     return {way: [next(found) for _ in range(SEEDS)] for way in WAYS}

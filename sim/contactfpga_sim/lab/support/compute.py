@@ -186,23 +186,15 @@ def within(support: Support, points_mm: np.ndarray) -> np.ndarray:
     return found
 
 
-class Task(NamedTuple):
-    design: str
-    model: str
-    kind: str
-    first: int
-
-
-def outcomes(task: Task) -> list[Outcome]:
-    pitch = DESIGNS[task.design][0]
-    numbers = range(task.first, task.first + PIECE)
-    return [outcome(drawn(task.design, task.model, task.kind, number), pitch) for number in numbers]
+def outcomes(design: str, model: str, kind: str, first: int) -> list[Outcome]:
+    numbers = range(first, first + PIECE)
+    return [outcome(drawn(design, model, kind, number), DESIGNS[design][0]) for number in numbers]
 
 
 def compute() -> dict[tuple[str, str, str], list[Outcome]]:
     """Outcomes of all scenes by design, kind and model."""
     keys = [(design, kind, model) for design in DESIGNS for kind in (*FAMILIES, *SUPPORTS) for model in MODELS]
-    tasks = [Task(design, model, kind, first) for design, kind, model in keys for first in range(0, SCENES, PIECE)]
+    tasks = [(design, model, kind, first) for design, kind, model in keys for first in range(0, SCENES, PIECE)]
     with pool.executor() as workers:
-        pieces = iter(workers.map(outcomes, tasks))
+        pieces = iter(workers.map(outcomes, *zip(*tasks)))
         return {key: [one for _ in range(0, SCENES, PIECE) for one in next(pieces)] for key in keys}

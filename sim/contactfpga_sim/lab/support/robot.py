@@ -51,7 +51,8 @@ class Lean(NamedTuple):
     """One of :data:`KINDS`, or ``several``."""
     outcome: compute.Outcome
     alone: list[bool]
-    """For each component of the wrench of a zone that is the only one: whether it is within its interval."""
+    """For each component of the wrench of a zone that is the only one: whether it is within its interval. Without
+    zones whose wrench is not known."""
     among: list[bool]
     """The same of several zones, each with the force on the cells nearest to it."""
 
@@ -211,7 +212,8 @@ class Stand:
         hits = []
         for one in supports:
             true, between = shares[int(labels[zones.cells_of(one.zone)].max())], one.wrench_interval
-            assert between is not None
+            if between is None:
+                continue  # a unit is at its limit
             hits += [bool(low <= value <= high) for value, (low, high) in zip(true, between)]
         return (hits, []) if len(supports) == 1 else ([], hits)
 

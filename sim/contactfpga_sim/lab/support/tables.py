@@ -110,13 +110,20 @@ def _components(hits: Sequence[bool]) -> str:
 
 
 def braces_table(found: dict[str, list[float]] | None = None) -> str:
-    """The push that half of the robots stand, by way, the worst first."""
+    """The push that half of the robots stand, by way, the worst first; by direction also how many stand more and less
+    than the same robots without skin."""
     found = brace.survive_all() if found is None else found
-    rows = [["force may act", "impulse that half of them stand, Ns", "a quarter", "fall without a push"]]
+    bare = np.array(found["without skin"])
+    away = np.arange(len(bare)) % brace.PUSHES < len(brace.POINTS_M)  # of the first direction
+    head = ["force may act", "all pushes, Ns", "away from the arm", "more, less", "straight or toward it", "more, less"]
+    rows = [[*head, "fall without a push"]]
     for way, stood in sorted(found.items(), key=lambda item: float(np.median(item[1]))):
-        half, least = (quantile(stood, share) for share in (0.5, 0.25))
-        cells = (f"{one.value:.0f} ({one.low:.0f} to {one.high:.0f})" for one in (half, least))
-        rows.append([way, *cells, f"{sum(one < 0 for one in stood)} of {len(stood)}"])
+        mine, cells = np.array(stood), []
+        for some in (away | True, away, ~away):
+            half = quantile(mine[some].tolist(), 0.5)
+            cells += [f"{half.value:.0f} ({half.low:.0f} to {half.high:.0f})"]
+            cells += [f"{(mine > bare)[some].sum()}, {(mine < bare)[some].sum()} of {some.sum()}"]
+        rows.append([way, cells[0], *cells[2:], f"{(mine < 0).sum()} of {len(mine)}"])
     return writer.table_of(rows)
 
 
