@@ -14,11 +14,12 @@ import math
 import zlib
 from collections.abc import Callable
 from concurrent.futures import Executor
+from typing import Any
 
 import numpy as np
 from scipy.special import log_ndtr
 
-from contactfpga.design.cover import Load, Part, cells_of
+from contactfpga.design.cover import Load, cells_of
 from contactfpga_sim.apps import score
 from contactfpga_sim.apps.covers import DOME, sheet
 from contactfpga_sim.apps.score import MODELS, Entry, Score, Scores
@@ -50,7 +51,7 @@ class Touch:
         """(moments, rows, columns) largest forces so far, from moment ``first`` on."""
 
         @functools.cache  # a flat body's parts are the same all the time
-        def under_1_n(parts: tuple[Part, ...]) -> np.ndarray:
+        def under_1_n(parts: tuple[Any, ...]) -> np.ndarray:
             x, y = 1e-3 * x_mm, 1e-3 * y_mm
             moved = (dataclasses.replace(one, x_m=one.x_m + x, y_m=one.y_m + y) for one in parts)
             return self._cells.forces_n([Load(tuple(moved), 1.0)])

@@ -11,7 +11,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,11 +77,11 @@ class Film(NamedTuple):
         return np.where(pressed, 0, (ohm <= self.read_ohm()[:, of]).sum(axis=0))
 
 
-def _cell(**values: float) -> Film:
+def _cell(**values: Any) -> Film:
     return Film(dataclasses.replace(CELL, **values))
 
 
-def _ends(lasting: bool = False, **values: float) -> Film:
+def _ends(lasting: bool = False, **values: Any) -> Film:
     return Film(
         lasting=lasting,
         ends=tuple(Corner(**{name: sign * value for name, value in values.items()}) for sign in (-1, 1)),

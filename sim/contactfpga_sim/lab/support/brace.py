@@ -161,7 +161,7 @@ class Braced:
         if self.way == "without skin":
             return self.planned
         if self.cells.tobytes() != self.known[0]:
-            zones = frame_of(self.cells, self.plan.skin)
+            zones = frame_of(self.cells, self.plan.skin.sheet)
             if self.way == "rectangle":
                 zones = compute.extents_of(self.cells, PITCH_MM)
             supports = self.surfaces.supports(zones)

@@ -125,7 +125,7 @@ def drawn(design: str, model: str, kind: str, number: int) -> Drawn:
     there = patches(one, skin) if model == "elements" else modeled(one, skin, cover)
     limits = Cells(cover, skin.rows, skin.columns, 1e-3 * pitch, 1e-3 * pitch, number).thresholds_n
     cells = there.cells_n >= limits
-    supports = ContactSurfaces(skin.sheet, cover).supports(frame_of(cells, skin))
+    supports = ContactSurfaces(skin.sheet, cover).supports(frame_of(cells, skin.sheet))
     extents = extents_of(cells, pitch)
     return Drawn(there, cells, supports, ContactSurfaces(extents.sheet, cover).supports(extents))
 
