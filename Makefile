@@ -97,7 +97,7 @@ campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long t
 	$(PY) -m pytest -n $(JOBS) --dist worksteal -m campaign --timeout 7200 $(ARGS)
 
 soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
-	$(PY) -m contactfpga_sim.lab.speed.soak $(ARGS)
+	$(PY) -m contactfpga_sim.lab.reader.soak $(ARGS)
 
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]
 	$(PY) -m contactfpga_sim.lab.mutants $(ARGS)

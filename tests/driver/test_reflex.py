@@ -113,7 +113,7 @@ def test_the_example_says_what_stopped_it(capsys, monkeypatch):
 
 
 def test_the_measurement_counts_touches():
-    found = reflex.measured(2)
+    found = reflex.measured(reflex.PACE._replace(seconds=2.0))
     assert found.found_us == sorted(found.found_us)
     assert all(time_us > 0 for time_us in found.found_us)
     assert len(found.found_us) + found.silent > 0

@@ -4,7 +4,7 @@ import pytest
 from slow_skin import SLOW
 
 from contactfpga.driver.board import Board
-from contactfpga_sim.lab.speed import soak
+from contactfpga_sim.lab.reader import soak
 
 
 @pytest.mark.campaign  # it has a board to compile, and then takes its time

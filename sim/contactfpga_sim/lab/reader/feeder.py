@@ -7,11 +7,17 @@ import os
 import select
 import time
 import tty
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from contactfpga_sim.lab.speed.driver import SKIN, frame, greeting
+from contactfpga.skin import Skin
 from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.frame import join
+from contactfpga_sim.model.golden.hello import hello
+from contactfpga_sim.model.golden.packet import Packet
 from contactfpga_sim.model.golden.request import heard
+
+SKIN = Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5)
 
 ALIVE_S = 0.25
 """Interval of frames before the start."""
@@ -37,10 +43,43 @@ PACES = Pace(1_000, 1, 1.5), Pace(10_000, 1, 1.0), Pace(72_000, 18, 0.5)
 """The reference sheet's slow and fast scan, and 12 Mbaud's capacity."""
 
 
-class Feeder:
-    """Boards that answer requests until started, then write frames at their pace."""
+def frame(number: int, low: int, fingers: int = 1, step_us: int = 1024) -> bytes:
+    """A frame of fingertips of 3x3 cells, 4 rows apart, that move along rows."""
+    known = facts(SKIN)
+    x, y = 1 + number // 40 % (SKIN.columns - 2), SKIN.rows // 2
+    counted = 24 + 8 + 3 + known.area_bits + known.zones_bits
+    room = -(-(counted + 4) // 8) * 8 - counted
+    records = b""
+    for finger in range(fingers):
+        sums = ((9, known.area_bits), (9 * x, known.sum_x_bits), (9 * (y + 4 * finger), known.sum_y_bits))
+        records += join(sums)[0].to_bytes(known.item_bytes, "little")
+    trailer, width = join(
+        (
+            (number * step_us % 2**24, 24),
+            (number % 256, 8),
+            (low, 3),
+            (9 * fingers, known.area_bits),
+            (fingers, known.zones_bits),
+            (0, room + 4),
+            (5, 4),
+        )
+    )
+    packet = Packet()
+    packet.push(records + trailer.to_bytes(width // 8, "little"))
+    return packet.wire(before=known.fingerprint[:2])
 
-    def __init__(self, boards: int, pace: Pace, touched: bool = True):
+
+def greeting(number: int = 0) -> bytes:
+    """Hello of a new board that received this request."""
+    digits = [0] * 11 + [number >> 7 * place & 127 for place in range(3)] + [0, 0]
+    return hello(facts(SKIN), digits)
+
+
+class Feeder:
+    """Boards that answer requests until started, then write frames at their pace. ``touched``: frames with the
+    fingertip, by number."""
+
+    def __init__(self, boards: int, pace: Pace, touched: Callable[[int], bool] = lambda number: True):
         count = int(pace.per_second * pace.seconds)
         self._pace, self._touched = pace, touched
         context: Any = multiprocessing.get_context("fork")
@@ -112,7 +151,7 @@ class Feeder:
         self.end.value = end
 
     def _frame(self, number: int, low: int) -> bytes:
-        return frame(number, low, int(self._touched), self._pace.step_us)
+        return frame(number, low, int(self._touched(number)), self._pace.step_us)
 
     def begin(self) -> None:
         """Start writing once each board was asked."""

@@ -16,8 +16,7 @@ import numpy as np
 
 import contactfpga
 from contactfpga.errors import ContactFPGAError, MissingTool
-from contactfpga_sim.lab.reader.feeder import Feeder, Pace
-from contactfpga_sim.lab.speed.driver import SKIN
+from contactfpga_sim.lab.reader.feeder import SKIN, Feeder, Pace
 
 LEFT_OUT = 0.15
 """Ignored share of a stream's beginning."""

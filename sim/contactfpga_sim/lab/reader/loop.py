@@ -8,9 +8,8 @@ import time
 from typing import NamedTuple
 
 import contactfpga
-from contactfpga_sim.lab.reader.feeder import Feeder, Pace
+from contactfpga_sim.lab.reader.feeder import SKIN, Feeder, Pace
 from contactfpga_sim.lab.reader.latency import OPEN_S, computing
-from contactfpga_sim.lab.speed.driver import SKIN
 from contactfpga_sim.lab.tracking.reflex import example
 
 PACE = Pace(1_000, 1, 2.0)
@@ -28,7 +27,7 @@ def measured(reader: str, busy: bool, switch_s: float) -> MissedDeadlines:
     loop, usual = example(), sys.getswitchinterval()
     begun: list[float] = []
     silent = 0
-    with contextlib.closing(Feeder(1, PACE, touched=False)) as feeder:
+    with contextlib.closing(Feeder(1, PACE, lambda number: False)) as feeder:
         with contactfpga.open(feeder.ports[0], SKIN, timeout=OPEN_S, reader=reader) as board, computing(busy):
             sys.setswitchinterval(switch_s)
             try:

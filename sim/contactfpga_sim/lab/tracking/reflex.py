@@ -5,6 +5,7 @@ Another process plays a board on a pseudo-terminal, with a touch every 5 ms.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import statistics
 import time
@@ -13,15 +14,13 @@ from typing import NamedTuple
 
 import contactfpga
 from contactfpga.tools.console import interrupt
-from contactfpga_sim.lab.speed.driver import FRAMES, STEP_US, stream
+from contactfpga_sim.lab.reader.feeder import SKIN, Feeder, Pace
 
-PACED = 3
-"""Frames per write: 12,000 per second, slightly more than the reference Skin's."""
+PACE = Pace(12_000, 3, 5.0)
+"""Slightly faster than the reference Skin."""
 
 PERIOD, TOUCHED = 64, 16
-"""Frames from touch to touch, a divisor of FRAMES, and of a touch."""
-
-ROUNDS = 4
+"""Frames from touch to touch, and of a touch."""
 
 HEAD = ("stops on a touch", "median", "99 %", "worst", "stops on silence")
 
@@ -51,28 +50,30 @@ def example() -> ModuleType:
     return module
 
 
-def measured(rounds: int = ROUNDS) -> ReactionTimes:
+def measured(pace: Pace = PACE) -> ReactionTimes:
     """Run the loop repeatedly, from an untouched sheet."""
-    loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
+    loop, silent = example(), 0
+    found: list[float] = []
 
     def touched(number: int) -> bool:
         return number % PERIOD >= PERIOD - TOUCHED
 
-    with stream(rounds, PACED, touched) as (board, queue, feeder):
-        queue.close()
-        number = 0
-        while number < last:
-            while board.latest(10.0).pressed:
-                pass
-            stop = loop.guard(board, lambda: None, lambda: None)
-            if stop.reason != "contact":
-                silent += 1
-                continue
-            number = stop.zones.time_us // STEP_US
-            touch = number - number % PERIOD + PERIOD - TOUCHED
-            if number > FRAMES // 10:
-                found.append((stop.decided_s - feeder.written_s[touch]) * 1e6)
-    return ReactionTimes(sorted(found), silent)
+    with contextlib.closing(Feeder(1, pace, touched)) as feeder:
+        with contactfpga.open(feeder.ports[0], SKIN, timeout=10.0) as board:
+            feeder.begin()
+            while feeder.end.value < 0:
+                with contextlib.suppress(contactfpga.ReadTimeout):
+                    while board.latest(1.0).pressed:
+                        pass
+                stop = loop.guard(board, lambda: None, lambda: None)
+                if stop.reason == "contact":
+                    number = stop.zones.time_us // pace.step_us
+                    touch = number - number % PERIOD + PERIOD - TOUCHED - feeder.first[0]
+                    found.append((stop.decided_s - feeder.written_s[touch]) * 1e6)
+                elif feeder.end.value < 0:
+                    silent += bool(found)  # before, frames are still being made
+            assert not board.stats.lost
+    return ReactionTimes(sorted(found[len(found) // 10 :]), silent)
 
 
 def main() -> int:

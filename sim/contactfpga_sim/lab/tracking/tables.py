@@ -14,7 +14,7 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.knobs import Knob, Sweep
-from contactfpga_sim.lab.speed.driver import frame, greeting
+from contactfpga_sim.lab.reader.feeder import frame, greeting
 from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
 
 FRAMES = 8192

@@ -1,1 +1,0 @@
-"""Speed of board and driver on this machine."""
