@@ -89,7 +89,7 @@ def test_gaps_narrower_than_the_foam_may_join():
 
 
 def test_an_untouched_sheet_reads_nothing_however_old_its_preload(monkeypatch):
-    """Without the guard some sheets do."""
+    """Without the guard in the mask some sheets do."""
     reading, rest = Reading((0.05, 0.2)), np.zeros((40, 40))
     assert not any(Sensed(rest, seed).levels(reading).any() for seed in range(100))
     monkeypatch.setattr(light, "GUARD", 1.0)

@@ -29,7 +29,7 @@ CREEP = 0.05
 TOUCHED, OLDER = (-1.0, 3.0), 3.0
 """Decades of a touch's time in s; most decades by which a preload is older than the reading at rest."""
 GUARD = 0.8
-"""Part of a level's force from which a cell at rest counts as at that level: then its sample is taken later."""
+"""Part of the lightest level's force from which a cell at rest is masked: its preload may creep."""
 LASTS = 2
 """Levels by which a part must last, of three levels."""
 
@@ -58,10 +58,9 @@ class Sensed:
         self._touched_n = gain * (np.maximum(forces_n, 0) * touch + preload * older)
 
     def levels(self, reading: Reading) -> np.ndarray:
-        """(rows, columns) level of each cell; 0 unless it is above the cell's own level at rest."""
-        forces, read = reading.forces_n, (self._rest_n / GUARD, self._touched_n)
-        rest, touched = (np.searchsorted(forces, one, "right") for one in read)
-        return np.where(touched > rest, touched, 0)
+        """(rows, columns) level of each cell; 0 where its preload masks it, as a Skin's `mask` does."""
+        masked = self._rest_n >= GUARD * reading.forces_n[0]
+        return np.where(masked, 0, np.searchsorted(reading.forces_n, self._touched_n, "right"))
 
 
 def reading_of(skin: Skin, cell: ResistiveCell) -> Reading:

@@ -16,7 +16,7 @@ from contactfpga.design.kits import Kit
 from contactfpga.design.sheet.extract import extracted
 from contactfpga.zones.levels import LASTS
 from contactfpga_sim.apps import errors, pool, result_cache, score
-from contactfpga_sim.apps.light import OLDER, TOUCHED
+from contactfpga_sim.apps.light import GUARD, OLDER, TOUCHED
 from contactfpga_sim.apps.score import Interval, interval
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.benchmark import entries, scenes
@@ -33,12 +33,14 @@ KITS = ("starter", "soft")
 
 
 def _film_ohm(forces_n: np.ndarray, cell: ResistiveCell, *seeds: int) -> np.ndarray:
-    """Resistances of a drawn film; its preload and creep are as in :class:`contactfpga_sim.apps.light.Sensed`."""
+    """Resistances of a drawn film, infinite where its preload masks a cell; preload, creep and mask are as in
+    :class:`contactfpga_sim.apps.light.Sensed`."""
     rng, creep = np.random.default_rng(seeds), cell.creep / cell.exponent
     gain = np.exp(cell.spread / cell.exponent * rng.standard_normal(forces_n.shape))
     preload = cell.preload_n * np.abs(rng.standard_normal(forces_n.shape))
     touch, older = 1 + creep * rng.uniform(*TOUCHED), 1 + creep * rng.uniform(0, OLDER)
-    return cell.ohm(gain * (np.maximum(forces_n, 0) * touch + preload * older))
+    ohm = cell.ohm(gain * (np.maximum(forces_n, 0) * touch + preload * older))
+    return np.where(GUARD * cell.ohm(gain * preload) <= cell.level_ohm, np.inf, ohm)
 
 
 Outcome = tuple[bool, bool, float]
