@@ -42,9 +42,7 @@ def run(args: argparse.Namespace) -> int:
     plan = link(body, args.link)
     _check(body, plan, args.joint)
     output = outputs.file(args.output, "FOLDS.json")
-    terminal.say(
-        f"move {args.joint} slowly over its whole range, there and back; nobody may touch the cover", sys.stderr
-    )
+    terminal.say(f"move {args.joint} slowly over its whole range, twenty times; nobody may touch the cover", sys.stderr)
     try:
         with OpenBody(Body({plan.name: plan}), opened=_with_margin) as opened:
             found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
