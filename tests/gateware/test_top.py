@@ -105,8 +105,10 @@ def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, de
     size = math.ceil((counted + 4) / 8) + 1
     for packet in frames:
         word = int.from_bytes(packet[-size:-1], "little")
-        number = (word >> 24 & 255) + (word >> counted)  # frames sent and frames overwritten before it
+        number = (12 * (word & 0xFFFFFF) + 11) // (clocks * rows)  # of its scan, by its time
         assert word & 0xFFFFFF == (number * clocks * rows + clocks) // 12
+        before = (word >> 24 & 255) + (word >> counted)  # sent, and overwritten modulo the bits of their counter
+        assert (number - before) % (1 << 8 * (size - 1) - counted) == 0
 
 
 WATCHED = (
