@@ -12,7 +12,7 @@ from contactfpga.choices import labellers
 from contactfpga_sim.model import golden
 from contactfpga_sim.model.board.virtual import VirtualBoard
 
-DEFAULT_SKINS, CAMPAIGN_SKINS = 1, 200
+DEFAULT_SKINS, CAMPAIGN_SKINS = 1, 60
 FRAMES = 25
 
 
