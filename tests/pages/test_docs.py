@@ -103,6 +103,7 @@ LEFT_OUT = {
     "it needs KiCad; test_sheet_kicad.py": "sheet examples/tiles.toml -o build/tiles --kicad",
     "it writes into /tmp; test_virtual_board.py": "board --skin left.toml",
     "it asks a person; test_bringup.py": "bringup",
+    "it scores the reader's own file; test_benchmark.py": "study benchmark --scenes",
     "minutes; their own tests": "build, study arm, fit, latency, wave, body examples/robot.toml, view examples/",
 }
 """First words of the commands that this test leaves out, by the reason."""
