@@ -73,13 +73,13 @@ def random_use(boards, rng, frames):
         board.pull_low(low)
 
 
-# Frames: 1,000 in 1.4 s, a million in half an hour.
+# Frames: 1,000 in 1.4 s to 8 s.
 @pytest.mark.parametrize(
     ("name", "frames"),
     [
         ("reference", 1000),
         pytest.param("reference", 3000, marks=pytest.mark.slow),
-        *(pytest.param(name, 170_000, marks=[pytest.mark.campaign, pytest.mark.timeout(7200)]) for name in SKINS),
+        *(pytest.param(name, 40_000, marks=[pytest.mark.campaign, pytest.mark.timeout(7200)]) for name in SKINS),
     ],
 )
 def test_random_frames_give_the_same_events(both, name, frames):
