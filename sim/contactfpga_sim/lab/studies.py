@@ -150,7 +150,7 @@ _ALL = (
         "levels",
         title="One level of force and several, read by the host",
         page="levels.md",
-        minutes=5,
+        minutes=6,
         sections=tables("levels verdict places", entries=Section("tables:entries_table", page="benchmark.md")),
         compute="tables:compute",
         pictures="tables:draw",
