@@ -73,7 +73,7 @@ class Panel(NamedTuple):
 
 PANELS = (
     Panel("scenes with a wrong count, %", "wrong", 100.0, (2, 5, 10, 20, 50, 100), (1.5, 150)),
-    Panel("error of place, mm", "place_mm", 1.0, (0.1, 0.2, 0.5, 1, 2, 5), (0.1, 6)),
+    Panel("error of place, mm", "place_mm", 1.0, (0.1, 0.2, 0.5, 1, 2, 5, 10, 20), (0.1, 30)),
 )
 TICKS_MS, ENDS_MS = (5, 10, 20, 30), (5, 36)
 BITS_MS = 19 * 10 / 3e3
