@@ -165,7 +165,7 @@ class Sweeping(DirectPort):
 
 
 def explains(history, apart, row, column, level, levels):
-    """Whether some frame, so many steps of the angle away, explains a cell's level: each cell by itself."""
+    """Whether a frame of the history explains one cell's level; ``apart`` counts steps of the angle to each frame."""
     near = history[:, max(0, row - 1) : row + 2, max(0, column - 1) : column + 2].any((1, 2))
     reaches = (history[:, row, column] >= level) | (near & (levels > level == 1))
     return bool((reaches & (apart <= (levels > 1))).any())

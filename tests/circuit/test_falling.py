@@ -21,7 +21,7 @@ from contactfpga_sim.model.sheet import agreement
 
 SIZE, ROW = 8, 4
 LEVELS_N = 0.13, 0.53, 1.74
-"""Of the soft kit (docs/soft.md)."""
+"""Levels of the soft kit (docs/soft.md)."""
 STATED = Circuit(falling=Falling(), column_pull_ohm=1e8, diode=SILICON, series_ohm=33.0)
 
 

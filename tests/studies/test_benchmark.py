@@ -209,7 +209,7 @@ def test_the_command_scores_and_draws_entries_of_others(folder, mine, tmp_path, 
 
 
 def test_the_estimate_is_the_mean_of_the_place():
-    """Of a narrow likelihood, of one that is even, and of one that is cut by the pitch."""
+    """A likelihood may be narrow, even within the pitch, or cut by the pitch."""
     half = entries.KITS_MM / 2
     narrow = bounds.estimate(lambda x, y: -((x - 1.3) ** 2 + (y + 2.1) ** 2) / 2 / 0.05**2)
     assert narrow == pytest.approx([1.3, -2.1], abs=0.02)

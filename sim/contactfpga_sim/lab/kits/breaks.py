@@ -90,7 +90,7 @@ def _ends(lasting: bool = False, **values: Any) -> Film:
 
 class Disturbance(NamedTuple):
     form: str
-    """Of a value, with its unit."""
+    """Format of a value with its unit."""
     expected: float
     tried: tuple[float, float]
     """Least and largest value tried."""

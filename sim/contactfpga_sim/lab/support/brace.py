@@ -29,8 +29,8 @@ from contactfpga_sim.lab.support.bed import COVER, FOAM_M, LINKS, PITCH_MM, Bed,
 
 WAYS = ("without skin", "barycenter", "rectangle", "polygon")
 DIRECTIONS_DEG, POINTS_M = (-40.0, 0.0, 40.0), ((-0.1, 0.2), (0.0, 0.2), (0.0, 0.4))
-"""Of the push, to the left of straight ahead, and where it acts on the trunk: y, and z above the waist's joint. The arm
-is the left one, so that the first direction is away from it."""
+"""Directions of pushes, to the left of straight ahead, and the points of the trunk on which they act: y, and z above
+the waist's joint. The left arm braces, so the first direction is away from it."""
 PUSHES = len(DIRECTIONS_DEG) * len(POINTS_M)
 IMPULSES_NS = tuple(10.0 * number for number in range(16))
 SEEDS = 45

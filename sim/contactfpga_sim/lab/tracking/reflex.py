@@ -71,7 +71,7 @@ def measured(pace: Pace = PACE) -> ReactionTimes:
                     touch = number - number % PERIOD + PERIOD - TOUCHED - feeder.first[0]
                     found.append((stop.decided_s - feeder.written_s[touch]) * 1e6)
                 elif feeder.end.value < 0:
-                    silent += bool(found)  # before, frames are still being made
+                    silent += bool(found)  # the board makes its frames before the first touch, and sends none
             assert not board.stats.lost
     return ReactionTimes(sorted(found[len(found) // 10 :]), silent)
 
