@@ -42,7 +42,7 @@ class Times:
 
     bit: int
     late: int
-    first: int
+    start: int
     settle: int
     release: int
     slot: int
@@ -53,11 +53,11 @@ def times(skin):
     bit = max(2, math.ceil(skin.clock_hz / skin.shift_hz))
     by_rows, by_columns = skin.row_drive == "74hc595", skin.column_read == "74hc165"
     late = bit * math.ceil(skin.columns / skin.column_chains) * by_columns
-    first = ((math.ceil(skin.rows / skin.row_chains) + 1) * bit + 1) * by_rows
+    shift = ((math.ceil(skin.rows / skin.row_chains) + 1) * bit + 1) * by_rows
     read = late + bit * by_columns
     release = max(math.ceil(skin.release_us * megahertz), read, bit * by_rows)
-    settle = max(math.ceil(skin.settle_us * megahertz), read, first - release)
-    return Times(bit, late, first, settle, release, settle + release)
+    settle = max(math.ceil(skin.settle_us * megahertz), read, shift - release)
+    return Times(bit, late, (settle + release) * by_rows, settle, release, settle + release)
 
 
 @dataclasses.dataclass
@@ -99,14 +99,14 @@ def run(bench, skin, cells, sheet=None):
 def expected_driven(skin, cycles):
     """The rows that are driven in each cycle."""
     t = times(skin)
-    slots = [divmod(cycle - t.first, t.slot) for cycle in range(cycles)]
+    slots = [divmod(cycle - t.start, t.slot) for cycle in range(cycles)]
     return [[slot % skin.rows] if slot >= 0 and clock < t.settle else [] for slot, clock in slots]
 
 
 def expected_rows(skin, cells):
     """(cycle, cells) of each row that is offered."""
     t = times(skin)
-    samples = range(t.first + t.settle - 1, len(cells) - t.late - 3, t.slot)
+    samples = range(t.start + t.settle - 1, len(cells) - t.late - 3, t.slot)
     return [(sample + t.late + 3, cells[sample][slot % skin.rows]) for slot, sample in enumerate(samples)]
 
 
@@ -117,7 +117,7 @@ def changing(rng, skin, cycles):
 
 def slots(skin, count):
     t = times(skin)
-    return t.first + count * t.slot + t.late + 6
+    return t.start + count * t.slot + t.late + 6
 
 
 # ---- what is driven and read, and when
@@ -165,7 +165,7 @@ def test_derived_clocks_are_those_of_the_rules():
         skin = skin_of(rows, columns, megahertz, settle_us=20.0, release_us=1.0, **options)
         mine, theirs = times(skin), skin.derived
         assert (mine.settle, mine.release) == (theirs.settle_clocks, theirs.release_clocks)
-        assert (mine.first, mine.late) == (theirs.row_shift_clocks, theirs.column_shift_clocks)
+        assert (mine.start, mine.late) == (theirs.start_clocks, theirs.column_shift_clocks)
         if registers:
             assert mine.bit == theirs.shift_clocks
 
@@ -238,7 +238,7 @@ def test_power_up_contents_never_reach_the_sheet(bench, power_up):
     full = [[31] * 9] * slots(skin, 10)
     got = run(bench, skin, full, SheetAtPins(skin, power_up))
     assert got.driven == expected_driven(skin, len(full))
-    assert got.driven[: times(skin).first] == [[]] * times(skin).first
+    assert got.driven[: times(skin).start] == [[]] * times(skin).start
     assert got.rows == expected_rows(skin, full)
 
 

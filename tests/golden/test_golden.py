@@ -176,7 +176,7 @@ def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
     timeline = stimulus(skin, cycles, seed=1)
     trace = predict(skin, timeline, cycles)
     rows = np.array([[word >> column & 1 for column in range(skin.columns)] for _, word, _ in trace.rows], bool)
-    strobe = known.row_shift + known.settle + 1 + known.column_shift
+    strobe = known.first_slot + known.settle + 1 + known.column_shift
     late = strobe + 1 + (skin.columns + 3 if known.debounced else 0)
     seen = 0
     for begun, plain in packets(skin, trace):

@@ -22,7 +22,9 @@ def count_levels(m: Module, scanner: wiring.Component, slots: Any, columns: Valu
         sample.harder.append(ruler)
         now, kept = (Signal(skin.columns, name=f"{name}_{level}") for name in ("level_now", "level_kept"))
         live = columns[: skin.columns]
-        with m.If(slots.clock == ruler.clock + 1):  # two synchronizer stages after the sample
+        sampled = Signal(name=f"sampled_{level}")  # two synchronizer stages ago
+        m.d.sync += sampled.eq(slots.clock == ruler.clock)
+        with m.If(sampled):
             m.d.comb += now.eq(~live if skin.selects_low else live)
         with m.Else():
             m.d.comb += now.eq(kept)

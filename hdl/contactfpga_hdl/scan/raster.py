@@ -14,13 +14,14 @@ from contactfpga_hdl.util.upset import upset
 
 
 class _Slots:
-    """The current slot: rows follow each other, a guard row before row 0; before the first slot its row is shifted."""
+    """The current slot: rows follow each other, a guard row before row 0; before the first slot its row is shifted, in
+    a slot of its own (a counter that does not begin with 0 would break the carry chain of an iCE40)."""
 
     def __init__(self, derived: Derived):
-        slot, shifting, lines = derived.row_clocks, derived.row_shift_clocks, derived.skin.row_lines
-        begun = int(not shifting)
+        slot, lines = derived.row_clocks, derived.skin.row_lines
+        begun = int(not derived.start_clocks)
         self.first = first_row(derived.skin)
-        self.clock = Signal(range(slot), init=(slot - shifting) % slot)
+        self.clock = Signal(range(slot))
         self.scans = Signal(init=begun)  # in the first slot and after it
         self.following = Signal(lines, init=1 << (self.first + begun) % lines)  # row of the next one, one-hot
 
@@ -261,7 +262,7 @@ class Scanner(wiring.Component):
         # The time starts with the first slot of the last row, so that at this row's strobe it gives the time of row
         # 0's sample: no register has to keep that.
         guarded = self.derived.row_clocks if self.skin.guard else 0
-        clock = FrameClock(self.skin, ahead=self.derived.row_shift_clocks + guarded - late)
+        clock = FrameClock(self.skin, ahead=self.derived.start_clocks + guarded - late)
         m.submodules.frame_clock = clock
         started = Signal()
         with m.If(slots.is_last):

@@ -279,6 +279,11 @@ class Derived(Widths):
         return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
 
     @property
+    def start_clocks(self) -> int:
+        """Clocks from a restart to a raster scan's first slot: a slot in which its row is shifted, if it is."""
+        return self.row_clocks if self.row_shift_clocks else 0
+
+    @property
     def column_load_clocks(self) -> int:
         """Clocks of the pulse that loads all columns in its last clock; 0 with direct columns."""
         return self.shift_clocks if self.skin.column_read == "74hc165" else 0

@@ -126,7 +126,7 @@ class Facts:
 
     @functools.cached_property
     def row_shift(self) -> int:
-        """Z: clocks by which a row pattern is shifted before its slot."""
+        """H: clocks by which a row pattern is shifted before its slot."""
         if self.skin.row_drive == "direct":
             return 0
         return 1 + -(-self.row_lines // self.skin.row_chains) * self.shift_bit + self.shift_bit
@@ -162,6 +162,11 @@ class Facts:
     @functools.cached_property
     def row_clocks(self) -> int:
         return self.settle + self.release
+
+    @functools.cached_property
+    def first_slot(self) -> int:
+        """Z: clock in which the first slot begins."""
+        return 0 if self.skin.row_drive == "direct" else self.row_clocks
 
     @functools.cached_property
     def scan_clocks(self) -> int:

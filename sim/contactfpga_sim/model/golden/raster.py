@@ -34,9 +34,9 @@ class Raster(ScanRule):
             play.stages.frame(dataclasses.replace(one, faults=changes[-1][1] if changes else 0), cells)
         driven = []
         for slot in range(frames * facts.row_lines):
-            start = facts.row_shift + slot * facts.row_clocks
+            start = facts.first_slot + slot * facts.row_clocks
             driven += [(start, 1 << _line(facts, slot)), (start + facts.settle, 0)]
-        beginnings = [facts.row_shift + number * facts.scan_clocks for number in range(frames + 1)]
+        beginnings = [facts.first_slot + number * facts.scan_clocks for number in range(frames + 1)]
         return ScanOutput(contact(facts, scanned), driven, beginnings)
 
 
@@ -50,12 +50,12 @@ def strobe(facts: Facts, slot: int) -> int:
 
 def sampled(facts: Facts, slot: int) -> int:
     """Cycle whose column levels a slot samples."""
-    return facts.row_shift + slot * facts.row_clocks + facts.settle - 1
+    return facts.first_slot + slot * facts.row_clocks + facts.settle - 1
 
 
 def _asked_before(facts: Facts, slot: int) -> int:
     if facts.samples_early:
-        return facts.row_shift + slot * facts.row_clocks
+        return facts.first_slot + slot * facts.row_clocks
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
@@ -97,7 +97,7 @@ def _instants(
         return [((clocks,), not clocks) for clocks in early]
     lines, found = FaultyLines(facts), []
     for frame, slot in enumerate(slots):
-        start = facts.row_shift + (slot - 1) * facts.row_clocks
+        start = facts.first_slot + (slot - 1) * facts.row_clocks
         values = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
         asked = [_sixteenths(facts, values, level) for level in range(facts.skin.levels)]
         ignored = lines.open_columns | facts.mask.all(axis=0)
@@ -169,7 +169,7 @@ def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
     columns = np.zeros(facts.column_lines, bool)
     for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
         if slot:
-            columns |= stuck(facts, timeline, facts.row_shift + slot * facts.row_clocks - 1)
+            columns |= stuck(facts, timeline, facts.first_slot + slot * facts.row_clocks - 1)
     return columns
 
 

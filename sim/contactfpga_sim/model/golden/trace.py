@@ -82,7 +82,7 @@ class Timeline:
         """Each (R, C) frame, with its stuck columns, held for one scan from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
         lines = list(stuck) if stuck is not None else [None] * len(held)
-        first, scan = facts(skin).row_shift, facts(skin).scan_clocks
+        first, scan = facts(skin).first_slot, facts(skin).scan_clocks
         starts = [first * (i > 0) + i * scan for i in range(len(held))]
         pieces = list(zip(starts, held, lines, strict=True))
         return cls(pieces, received)
@@ -96,7 +96,7 @@ class Timeline:
         pieces, cuts = {}, {0: Cuts()}
         for frame, clocks in enumerate(frames):
             for slot, row in enumerate(order, frame * known.row_lines):
-                start = known.row_shift + slot * known.row_clocks
+                start = known.first_slot + slot * known.row_clocks
                 fall = np.minimum(clocks[row], known.row_clocks)
                 for clock in {-1, *fall[fall < known.row_clocks].tolist()}:
                     at = max(0, start + clock)
