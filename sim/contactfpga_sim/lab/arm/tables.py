@@ -85,11 +85,11 @@ def places_table(found: ArmRuns) -> writer.Table:
 
 
 def kits_table(found: ArmRuns) -> writer.Table:
-    """The page has the starter kit with domes and light cells and the paper's sheet, without palms and half-space."""
+    """The page has a kit with domes and one with light cells, without palms."""
     head, *rows = kits.lines(found.kits)
 
     def shown(row: Sequence[str]) -> bool:
-        return row[1] != "palm" and row[0] in ("starter", kits.LIGHT, "paper")
+        return row[1] != "palm" and row[0] in ("starter", "soft")
 
     return writer.Table(head, rows, shown)
 

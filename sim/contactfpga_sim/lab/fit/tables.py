@@ -13,12 +13,12 @@ from contactfpga_sim.apps.fit import show
 from contactfpga_sim.apps.fit.search import fit
 from contactfpga_sim.lab import writer
 
-SHOWN = ("--placements may tell", "the answer")
-"""Ends of the verdicts that the page shows."""
+SHOWN = 8
+"""Sheets that the page shows."""
 
 
 def section(arguments: str) -> writer.Table:
-    """The page shows the answer and what more scenes might prefer."""
+    """The page shows the last sheets, each by its last row: the nearest to the limits, or the answer."""
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
@@ -31,7 +31,8 @@ def section(arguments: str) -> writer.Table:
     names, *rows = show.rows(found)
     after = f"{writer.table_of([head, checked])}\n\n{' '.join(show.notes(found))}"
     columns = [name for name in names if name not in ("pitch mm", "bytes")]
-    return writer.Table(names, rows, lambda row: row[-1].endswith(SHOWN), columns, f"    {command}", after)
+    last = [*{row[names.index("sheet")]: row for row in rows}.values()][-SHOWN:]
+    return writer.Table(names, rows, lambda row: row in last, columns, f"    {command}", after)
 
 
 def fingers_section() -> writer.Table:
