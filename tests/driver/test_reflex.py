@@ -8,7 +8,7 @@ import pytest
 from model_board import SCAN_US, DirectPort, ModelBoard
 
 import contactfpga
-from contactfpga_sim.lab.tracking import reflex
+from contactfpga_sim.lab.reader import reflex
 
 SKIN = contactfpga.Skin()
 LOOP = reflex.example()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import contactfpga
 from contactfpga_sim.lab.reader.feeder import SKIN, Feeder, Pace
 from contactfpga_sim.lab.reader.latency import OPEN_S, computing
-from contactfpga_sim.lab.tracking.reflex import example
+from contactfpga_sim.lab.reader.reflex import example
 
 PACE = Pace(1_000, 1, 2.0)
 

@@ -14,8 +14,9 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.lab import knobs, writer
 from contactfpga_sim.lab.knobs import Knob, Sweep
+from contactfpga_sim.lab.reader import reflex
 from contactfpga_sim.lab.reader.feeder import frame, greeting
-from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores
+from contactfpga_sim.lab.tracking import breaks, scenes, scores
 
 FRAMES = 8192
 

@@ -1,4 +1,4 @@
-"""Reaction time of the loop of ``examples/reflex.py`` on this machine: `python -m contactfpga_sim.lab.tracking.reflex`.
+"""Reaction time of the loop of ``examples/reflex.py`` on this machine: `python -m contactfpga_sim.lab.reader.reflex`.
 
 Another process plays a board on a pseudo-terminal, with a touch every 5 ms.
 """
