@@ -157,7 +157,7 @@ def test_commands_without_output_run_as_printed(page, tmp_path):
             process = running[command] = subprocess.Popen(words, **options, env=variables)
             stack.callback(process.kill)  # none outlives a test that fails
             if command.startswith(UNTIL_CTRL_C):
-                assert process.stdout.read1()
+                assert any(b": building " not in line for line in process.stdout)  # a Ctrl-C may not meet the build
             else:
                 del running[command]
                 said, _ = process.communicate(timeout=600)
