@@ -63,7 +63,7 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
     Sometimes a column never does, for several frames; levels are commanded at any time."""
     known, cuts, pieces, received, broken = facts(skin), {}, {}, [], np.zeros(skin.columns, bool)
     for frame in range(frames):
-        start = known.row_shift + frame * known.scan_clocks
+        start = known.first_slot + frame * known.scan_clocks
         if rng.random() < 0.15:
             late = frame > 2 * frames // 3  # what is reported open stays so for longer than this test
             broken = rng.random(skin.columns) < rng.choice([0, 0.4, 1]) * (late | (np.arange(skin.columns) == 0))
