@@ -230,7 +230,7 @@ def test_the_compiled_board_agrees_at_the_pins():
     for number, talk in enumerate(heard(want)):
         assert talk.hello.place == (number, 2)
         assert talk.stats.hellos > 1  # asked for
-        assert talk.stats.frames > 5
+        assert talk.stats.frames >= 5
         assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 

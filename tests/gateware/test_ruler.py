@@ -72,7 +72,10 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
         for clock in (-1, *{*fall.tolist()}):
             cuts[max(0, start + clock)] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows))
         for at in range(start + known.row_clocks, start + known.scan_clocks, known.row_clocks):
-            cuts[at - 1] = Cuts({0: skin.columns} if rng.random() < 0.05 else {})
+            # Once the guard column is cut after the sample, which takes it along, and before the settle time ends.
+            cuts[at + (known.settle - 2 if frame == 3 else -1)] = Cuts(
+                {0: skin.columns} if frame == 3 or rng.random() < 0.05 else {}
+            )
             close = rng.integers(0, known.settle + 3, skin.columns)
             pieces |= {at + clock: np.tile(close <= clock, (skin.rows, 1)) for clock in (-1, *close.tolist())}
     at = 10 * known.scan_clocks

@@ -178,13 +178,13 @@ def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Requ
     if not facts.skin.guard:
         return [[]] * count
     faulty, result = FaultyLines(facts), []
-    for frame, (_, checks_rows) in enumerate(_instants(facts, timeline, requests, count)):
+    for frame, ((ahead, *_), checks_rows) in enumerate(_instants(facts, timeline, requests, count)):
         changes, renews = [], _renews(facts, frame)
         slots = row_slots(facts, frame)
         faulty.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
         changes.append((strobe(facts, slots[0] - 1) + 1, faulty.word))
         for row, slot in enumerate(slots):
-            whole = _read(facts, timeline, slot)[-1]
+            whole = _read(facts, timeline, slot, ahead)[-1]
             if checks_rows:
                 faulty.check("rows", np.full(facts.rows, not whole), renews, row)
             if slot == slots[-1]:
