@@ -123,7 +123,7 @@ def test_gateware_and_model_agree_cycle_for_cycle():
 
 def test_guard_lines_alive_and_fail_safe_of_each_sheet():
     """Fault reports on the shared line, and the pins `alive` and `contact`, are the golden model's in each clock."""
-    want = check(GUARDED, timelines(GUARDED, 10_000, 3, [(6_000, request(9, True, 2, b"\x02\xb1"))]), 10_000)
+    want = check(GUARDED, timelines(GUARDED, 12_000, 6, [(6_000, request(9, True, 2, b"\x02\xb1"))]), 12_000)
     for skin, trace, talk in zip(GUARDED.skins, want, heard(want), strict=True):
         assert len(trace.alive) >= (3 if skin.guard else 6)
         assert talk.stats.damaged.total() == 0
