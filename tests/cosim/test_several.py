@@ -194,7 +194,7 @@ def test_a_fault_of_the_grants_is_seen(monkeypatch):
 
 def test_a_sheet_waits_for_one_packet_of_each_other_one():
     """Three sheets nearly always have a packet to send, one of them long ones: each waits for at most one packet of
-    each other. A sheet misses its turn only while its next frame is taking the place of the one that waited."""
+    each other. A sheet misses its turn if its next frame is just taking the place of the one that waited."""
     big = Skin(rows=16, columns=16, report="cells", settle_us=5.0, **REGISTERS)
     skins = [skin.replace(clock_hz=12_000_000, baud=1_000_000) for skin in (*SMALL.skins, big)]
     several = Several(tuple(skins))

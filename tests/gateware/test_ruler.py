@@ -72,7 +72,7 @@ def falling(skin: Skin, rng: np.random.Generator, frames: int) -> Timeline:
         for clock in (-1, *{*fall.tolist()}):
             cuts[max(0, start + clock)] = Cuts({}, dict.fromkeys(np.flatnonzero(fall > clock).tolist(), skin.rows))
         for at in range(start + known.row_clocks, start + known.scan_clocks, known.row_clocks):
-            # Once the guard column is cut after the sample, which takes it along, and before the settle time ends.
+            # In one frame the guard column is cut after the sample and before the settle time ends.
             cuts[at + (known.settle - 2 if frame == 3 else -1)] = Cuts(
                 {0: skin.columns} if frame == 3 or rng.random() < 0.05 else {}
             )

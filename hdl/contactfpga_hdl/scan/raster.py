@@ -14,8 +14,8 @@ from contactfpga_hdl.util.upset import upset
 
 
 class _Slots:
-    """The current slot: rows follow each other, a guard row before row 0; before the first slot its row is shifted, in
-    a slot of its own (a counter that does not begin with 0 would break the carry chain of an iCE40)."""
+    """The current slot: rows follow each other, a guard row before row 0. The first row, if it is shifted, is so in a
+    slot of its own, because a counter that does not begin with 0 would break the carry chain of an iCE40."""
 
     def __init__(self, derived: Derived):
         slot, lines = derived.row_clocks, derived.skin.row_lines

@@ -280,7 +280,7 @@ class Derived(Widths):
 
     @property
     def start_clocks(self) -> int:
-        """Clocks from a restart to a raster scan's first slot: a slot in which its row is shifted, if it is."""
+        """Clocks from a restart to a raster scan's first slot: those of a slot if rows are shifted, otherwise 0."""
         return self.row_clocks if self.row_shift_clocks else 0
 
     @property

@@ -14,7 +14,7 @@ from contactfpga_sim.apps.fit.search import fit
 from contactfpga_sim.lab import writer
 
 SHOWN = 8
-"""Sheets that the page shows."""
+"""Number of sheets that the page shows."""
 
 
 def section(arguments: str) -> writer.Table:
