@@ -10,6 +10,7 @@ import pytest
 from sample import sample
 
 from contactfpga import Skin
+from contactfpga_sim.model.board.receiver import frames_in
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import command
@@ -105,3 +106,25 @@ def test_each_frame_is_sampled_where_the_golden_model_says(name):
     assert {cell for _, row, _ in expected.rows for cell in in_row(skin, row)} == {*range(skin.levels + 1)}
     assert [row[1] for row in expected.rows] != [row[1] for row in plain.rows], "no sample was moved"
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+def test_the_first_frame_that_names_a_command_is_sampled_as_it_asks():
+    """Also if the command arrives between the guard row's slot, in which the ruler is measured, and row 0's."""
+    skin = Skin(rows=1, columns=2, ruler=8, report="cells", settle_us=400, **TINY)
+    known, fall, command_clocks = facts(skin), 80, 14 * 10 * 4  # bytes, bits, clocks
+    pieces, cuts = [], []
+    for slot in range(20):
+        start, guard = known.first_slot + slot * known.row_clocks, slot % 2 == 0
+        closed = np.full((1, 2), not guard)
+        pieces += [(start, ~np.ones((1, 2), bool), None), (start + fall, closed, None)]
+        cuts += [(start, Cuts({}, {0: 1, 1: 1} if guard else {})), (start + fall, Cuts({}))]
+    arrived = []
+    for at in range(3 * known.scan_clocks, 5 * known.scan_clocks, 37):
+        sent = [(at - command_clocks, command(5, 2, 32, False, known.bit_clocks))]
+        trace = predict(skin, Timeline(pieces, sent, cuts), 10 * known.scan_clocks)
+        frames = [one.frame for one in frames_in(skin, trace.bytes)]
+        asked = [frame.bitmap.all() for frame in frames if frame.heard == 5]
+        assert not any(frame.bitmap.any() for frame in frames if frame.heard != 5)
+        assert asked and all(asked), f"a command that arrives {at - 3 * known.scan_clocks} clocks after a frame began"
+        arrived.append(len(asked))
+    assert len({*arrived}) > 1

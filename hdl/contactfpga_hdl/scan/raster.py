@@ -30,6 +30,11 @@ class _Slots:
         return self.following[self.first] & self.scans
 
     @property
+    def begins_guard(self) -> Value:
+        """The guard row's slot does, by whose ruler the rows after it are sampled."""
+        return self.following[0] & (self.clock == 0)
+
+    @property
     def begins_rows(self) -> Value:
         return self.following[1 % len(self.following)] & (self.clock == 0)
 
@@ -135,11 +140,10 @@ class Scanner(wiring.Component):
             found = upset(m, "row", slots.following, driver.drive)
             m.d.comb += self.upset.eq(driver.upset | found | clock.upset)
         if skin.ruler:
-            live = ~reader.levels if skin.selects_low else reader.levels
-            begun, clock_of = slots.following[0] & (slots.clock == 0), slots.clock
+            live, clock_of = ~reader.levels if skin.selects_low else reader.levels, slots.clock
             under_way = sample.is_guard & (clock_of >= 2) & (clock_of <= self.derived.settle_clocks + 1)
             for ruler in (sample.moved, *sample.harder):
-                ruler.measure(m, begun, under_way, live[: skin.columns], self.faults.columns)
+                ruler.measure(m, slots.begins_guard, under_way, live[: skin.columns], self.faults.columns)
         # Faults
         m.d.comb += [
             stuck.columns.eq(sample.read),
@@ -268,9 +272,12 @@ class Scanner(wiring.Component):
         with m.If(slots.is_last):
             m.d.sync += started.eq(1)
         # What comes while columns are shifted in came after their sample: it asks for the next frame. Where the sample
-        # moves so does what comes after the first clock.
+        # moves so does what comes after the clock in which it is set.
         moves = moves_sample(self.derived)
-        begins = slots.begins_rows if moves else (sample.begins if late else sample.of_row) & sample.is_first
+        if moves:
+            begins = slots.begins_guard if self.skin.ruler else slots.begins_rows
+        else:
+            begins = (sample.begins if late else sample.of_row) & sample.is_first
         m.d.comb += [
             clock.runs.eq(started | slots.is_last),
             clock.frame_begins.eq(begins),

@@ -40,7 +40,7 @@ class Archive:
         try:
             with zipfile.ZipFile(self.path) as file:
                 self._sizes = {info.filename.removesuffix(".npy"): info for info in file.infolist()}
-        except (OSError, zipfile.BadZipFile) as error:
+        except (OSError, zipfile.error) as error:
             raise ScoreError(f"{self.path} is no NPZ file: {error}; write it with numpy.savez_compressed") from None
 
     def read(self, name: str, kinds: str, shape: Sequence[int | None] = ()) -> np.ndarray:
@@ -52,7 +52,7 @@ class Archive:
         try:
             with zipfile.ZipFile(self.path) as file, file.open(self._sizes[name]) as opened:
                 found = _array(io.BytesIO(opened.read(MOST_BYTES)))
-        except (OSError, ValueError, EOFError, zipfile.error, zipfile.BadZipFile, NotImplementedError) as error:
+        except (OSError, ValueError, EOFError, zipfile.error, NotImplementedError) as error:
             raise ScoreError(f"{self.path}: {name} cannot be read: {error}") from None
         wanted = tuple(got if want is None else want for want, got in zip(shape, found.shape))
         if found.dtype.kind not in kinds or found.shape != wanted or len(wanted) != len(shape):

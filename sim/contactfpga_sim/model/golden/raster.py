@@ -55,7 +55,7 @@ def sampled(facts: Facts, slot: int) -> int:
 
 def _asked_before(facts: Facts, slot: int) -> int:
     if facts.samples_early:
-        return facts.first_slot + slot * facts.row_clocks
+        return facts.first_slot + (slot - (facts.skin.ruler > 0)) * facts.row_clocks  # the ruler is in the guard row
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
@@ -97,7 +97,7 @@ def _instants(
         return [((clocks,), not clocks) for clocks in early]
     lines, found = FaultyLines(facts), []
     for frame, slot in enumerate(slots):
-        start = facts.first_slot + (slot - 1) * facts.row_clocks
+        start = _asked_before(facts, slot)
         values = [one.command[1] for one in requests if one.cycle < start and one.command and one.command[0] == 2]
         asked = [_sixteenths(facts, values, level) for level in range(facts.skin.levels)]
         ignored = lines.open_columns | facts.mask.all(axis=0)
