@@ -118,13 +118,11 @@ def test_the_first_frame_that_names_a_command_is_sampled_as_it_asks():
         closed = np.full((1, 2), not guard)
         pieces += [(start, ~np.ones((1, 2), bool), None), (start + fall, closed, None)]
         cuts += [(start, Cuts({}, {0: 1, 1: 1} if guard else {})), (start + fall, Cuts({}))]
-    arrived = []
     for at in range(3 * known.scan_clocks, 5 * known.scan_clocks, 37):
         sent = [(at - command_clocks, command(5, 2, 32, False, known.bit_clocks))]
         trace = predict(skin, Timeline(pieces, sent, cuts), 10 * known.scan_clocks)
         frames = [one.frame for one in frames_in(skin, trace.bytes)]
         asked = [frame.bitmap.all() for frame in frames if frame.heard == 5]
         assert not any(frame.bitmap.any() for frame in frames if frame.heard != 5)
-        assert asked and all(asked), f"a command that arrives {at - 3 * known.scan_clocks} clocks after a frame began"
-        arrived.append(len(asked))
-    assert len({*arrived}) > 1
+        assert len(asked) > 3
+        assert all(asked), f"a command that arrives {at - 3 * known.scan_clocks} clocks after a frame began"
