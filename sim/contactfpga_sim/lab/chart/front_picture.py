@@ -54,8 +54,10 @@ ROWS = {
         {"0.2 N": (0, 9)},
     ),
     "one level of force, by pitch": Row(style.GREEN, "^", _pitches("one level"), others={"4": (-5, -4)}),
-    "three levels, by pitch": Row(style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10)}),
-    "three levels of the soft kit": Row(style.VERMILLION, "s", {"soft": "soft kit"}, (-10, 0)),
+    "three levels, by pitch": Row(
+        style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10), "8": (4, 8)}
+    ),
+    "three levels of the soft kit": Row(style.VERMILLION, "s", {"soft": "soft kit"}, (-15, 0)),
     "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (-2, -10)),
     "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (1, -20)),
 }
@@ -80,7 +82,6 @@ BITS_MS = 19 * 10 / 3e3
 """Milliseconds that the bits of the shortest frame with a zone need at 3 Mbaud."""
 
 
-WALL = {"ha": "right", "va": "top", "fontsize": style.SMALL}
 ENOUGH = 30
 """Scenes with a right count from which a family's error of place counts."""
 
@@ -144,7 +145,9 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
         for entry in filter(lambda entry: panel is PANELS[1] and bound(by[entry]), by):
             least = max(float(line[panel.field]) for line in by[entry])
             axes.axhline(least, color=style.SOFT, ls="--", lw=1)
-            axes.text(0.99, least, f"{entry}: {least:.2f} mm", **WALL, transform=axes.get_yaxis_transform())
+            place = {"xytext": (0, -2), "textcoords": "offset points", "ha": "right", "va": "top"}
+            place |= {"xycoords": axes.get_yaxis_transform(), "fontsize": style.SMALL}
+            axes.annotate(f"{entry}: {least:.2f} mm", (0.99, least), **place)
     axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
     marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
