@@ -58,6 +58,17 @@ def test_a_light_touch_is_that_of_a_dense_solution(body):
     assert force == pytest.approx(touching(compliance, depth - height.ravel()), abs=0.02 * force.max())
 
 
+@pytest.mark.parametrize(("force_n", "touching"), [(2e-4, 1), (0.5, 13)])
+def test_a_body_that_first_touches_with_one_patch_presses_as_many_as_it_reaches(force_n, touching):
+    per = tiles(PITCH_MM).per
+    away = np.abs(np.arange(3 * per) - 3 * per // 2)
+    contact = Contact(PITCH_MM, BODIES["rigid"], 0.31 * np.hypot(away, away[:, None]))
+    force = contact.pressed(force_n)
+    assert force.sum() == pytest.approx(force_n)
+    assert force.max() == force[away == 0][:, away == 0]
+    assert np.count_nonzero(force) == touching
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_cells_carry_each_body(family):
     (scene,) = placements(family, 1, 4, SKIN)

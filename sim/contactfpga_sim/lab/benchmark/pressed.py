@@ -146,7 +146,10 @@ class Contact:
             along = np.where(touch, gap + keep * size / last * along, 0)
             answer = self.moved(along)
             answer -= answer[touch].mean()
-            step = (gap * along)[touch].sum() / (answer * along)[touch].sum()
+            if size:
+                step = (gap * along)[touch].sum() / (answer * along)[touch].sum()
+            else:  # a patch that touches alone says nothing of the others' stiffness but its own
+                step, size = force_n / self.moved(force).max(), 1.0
             new = np.maximum(0, np.where(touch, force - step * along, 0))
             met = (new == 0) & (gap < 0)
             new[met] -= step * gap[met]
