@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 
 import numpy as np
 import pytest
@@ -78,6 +79,19 @@ def test_places_lie_in_the_sheets_middle(count, low, high):
     assert high - 0.1 < max(found) <= high
 
 
+def test_each_touch_meets_another_sheet():
+    """A kit's worst force on a single drawn sheet was a third above another sheet's."""
+    case = BEST.case().but(run=RUN, touch=({"x_mm": 45.0, "y_mm": 44.0},))
+    found = {run(case, "torque", skin=tiled(), sheet=sheet, to_peak=True).outcome.closes_s for sheet in range(4)}
+    assert len(found) == 4
+    seen = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(places, "run", lambda *given, sheet, **rest: seen.append(sheet) or run(*given, **rest))
+        for batch in places.batches(case, tiled(), ((0.8e-3,),), 4):
+            places._touched(batch)
+    assert sorted(seen) == [0, 1, 2, 3]
+
+
 def test_a_run_to_its_peak_has_the_whole_runs_peak():
     case = BEST.case().but(run=RUN, touch=({"x_mm": 45.0, "y_mm": 44.0},))
     for latency in (0.5e-3, 6e-3):
@@ -118,6 +132,8 @@ def test_a_worst_value_that_another_seed_changes_gives_way_to_a_quantile():
     assert value == pytest.approx(np.quantile(values, 0.95), abs=0.1)
     assert low_said == pytest.approx(low, abs=0.1)
     assert high_said == pytest.approx(high, abs=0.1)
+    few = anywhere.worst_text(halves(even[::3], np.append(even[3::3], 12.0)))
+    assert re.fullmatch(r"95 %: 9\.\d \(at least 9\.\d\)", few)
 
 
 def made_up(newtons):

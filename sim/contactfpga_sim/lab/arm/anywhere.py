@@ -12,7 +12,7 @@ import numpy as np
 
 from contactfpga.design.cover import Cap, Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.apps import covers
+from contactfpga_sim.apps import covers, stats
 from contactfpga_sim.apps.score import wilson
 from contactfpga_sim.lab.arm import places
 from contactfpga_sim.lab.arm.case import Case
@@ -129,12 +129,9 @@ def worst_text(halves: Sequence[Peaks]) -> str:
     most = [float(half.force_n.max()) for half in halves]
     if max(most) <= (1 + SAME) * min(most):
         return f"{max(most):.1f}"
-    values = np.sort(np.concatenate([half.force_n for half in halves]))
-    n = len(values)
-    middle, half = n * QUANTILE, 1.96 * math.sqrt(n * QUANTILE * (1 - QUANTILE))
-    ranks = [min(n - 1, max(0, math.ceil(rank) - 1)) for rank in (middle, middle - half, middle + half)]
-    value, low, high = values[ranks]
-    return f"95 %: {value:.1f} ({low:.1f} to {high:.1f})"
+    one = stats.quantile(np.concatenate([half.force_n for half in halves]).tolist(), QUANTILE)
+    until = f"{one.low:.1f} to {one.high:.1f}" if math.isfinite(one.high) else f"at least {one.low:.1f}"
+    return f"95 %: {one.value:.1f} ({until})"
 
 
 def peak_text(halves: Sequence[Peaks]) -> str:

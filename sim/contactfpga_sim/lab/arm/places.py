@@ -1,7 +1,7 @@
 """Touches anywhere on the sheet.
 
-Places fill pitch cells in the sheet's middle evenly; each has a measured latency and an instant between controller
-samples.
+Places fill pitch cells in the sheet's middle evenly; each has a sheet with drawn closing forces, a measured latency and
+an instant between controller samples.
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool, float]]]:
     step = _step_s(case)
     phases = round(case.control.period_s / step)
     found: list[list[tuple[float, float, bool, float]]] = [[] for _ in batch.ways]
-    for x, y, phase, late, column, row in evenly(batch.count, batch.seed).tolist():
+    touches = evenly(batch.count, batch.seed).tolist()
+    for sheet, (x, y, phase, late, column, row) in enumerate(touches, batch.seed * batch.count):
         place = {
             "x_mm": _place_mm(x, column, skin.columns, skin.pitch_x_mm),
             "y_mm": _place_mm(y, row, skin.rows, skin.pitch_y_mm),
@@ -115,7 +116,7 @@ def _touched(batch: Batch) -> list[list[tuple[float, float, bool, float]]]:
         for number, latencies in enumerate(batch.ways):
             latency = float(np.quantile(latencies, late)) if latencies else 0.0
             way = "latency" if latencies else "torque"
-            outcome = run(moved, way, latency_s=latency, skin=skin, to_peak=True).outcome
+            outcome = run(moved, way, latency_s=latency, skin=skin, sheet=sheet, to_peak=True).outcome
             detected_m = math.nan if outcome.detected_m is None else outcome.detected_m
             limited = outcome.reason == "torque"
             found[number].append((outcome.peak_force_n, outcome.peak_indentation_m, limited, detected_m))

@@ -98,13 +98,15 @@ def run(
     latency_s: float = 6e-3,
     skin: Skin | None = None,
     faults: Faults | None = None,
+    sheet: int = 0,
     to_peak: bool = False,
 ) -> RunRecord:
     """Let the arm run into the touched things.
 
     ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: by
-    default the reference Skin, with units if needed; ``to_peak``: end once the force has fallen to half its peak after
-    the reaction. All ways but ``latency`` and ``torque`` compile the Skin's gateware.
+    default the reference Skin, with units if needed; ``sheet``: seed of its closing forces; ``to_peak``: end once the
+    force has fallen to half its peak after the reaction. All ways but ``latency`` and ``torque`` compile the Skin's
+    gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
@@ -120,7 +122,7 @@ def run(
             f"keep_alive_ms is {skin.keep_alive_ms:g}; without a frame the controller stops the arm after "
             f"{case.control.watchdog_s:g} s"
         )
-    world = World(case, way, skin, latency_s, faults)
+    world = World(case, way, skin, latency_s, faults, sheet)
     try:
         if way == "uart":
             _host(world)

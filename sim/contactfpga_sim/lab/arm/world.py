@@ -29,9 +29,9 @@ _LEAST_N, _FINE = 0.01, 1.1
 
 
 class Switches:
-    def __init__(self, case: Case, skin: Skin):
+    def __init__(self, case: Case, skin: Skin, sheet: int = 0):
         pitches = (skin.pitch_x_mm * _MM, skin.pitch_y_mm * _MM)
-        self._cells = cells_of(case.cover, skin.rows, skin.columns, *pitches)
+        self._cells = cells_of(case.cover, skin.rows, skin.columns, *pitches, sheet)
         self._bounce_s, self._period_s = case.switch.bounce_s, case.switch.bounce_period_s
         self._touches = case.touch
         body = BODIES[case.body]
@@ -163,7 +163,9 @@ class CourseStep(NamedTuple):
 class World:
     """One run. Time 0 is the first touch; :meth:`clock`, like a port, counts from power-up."""
 
-    def __init__(self, case: Case, way: str, skin: Skin, latency_s: float = 0.0, faults: Faults | None = None):
+    def __init__(
+        self, case: Case, way: str, skin: Skin, latency_s: float = 0.0, faults: Faults | None = None, sheet: int = 0
+    ):
         self.case = case
         self.faults = faults or Faults()
         self.controller = Controller(case)
@@ -175,7 +177,7 @@ class World:
         self.peak_n = 0.0
         self._way, self._latency_s, self._skin = way, latency_s, skin
         self._plant = Plant(case, skin)
-        self._switches = Switches(case, skin)
+        self._switches = Switches(case, skin, sheet)
         self._board = CompiledBoard(skin, capture=("contact",)) if way in (*PINS, "uart") else None
         self._under = UnitsUnderSheet(case, skin) if way in UNITS else None
         if self._board is not None and self._under is not None:
