@@ -62,7 +62,7 @@ def headlines(changes: Mapping[str, float], touches: int = TOUCHES, scenes: int 
     late_s, stated = 1e-6 * of.pop("late_us"), load_cover(KIT.skin_path)
     assert stated is not None
     one = predict.pressing(stated, of)
-    found = predict.measured(one, KIT.skin, 0)
+    found = predict.measured(predict.pressing(stated, {"spread": 0.0, **of}), KIT.skin, 0)  # usual switches
     latencies = tuple(late_s + each for each in _usual_s())
     rigid_n, forearm_n = (_peak_n(one.cover, body, of["patch"], latencies, touches) for body in ("rigid", "forearm"))
     told_ms = found["first_closing_ms"] + 1e3 * float(np.median(latencies))
