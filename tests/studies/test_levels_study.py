@@ -124,11 +124,10 @@ def test_the_choice_is_the_least_of_the_worst_families():
         return [[(one, one, math.nan if one else place - 0.1 * at) for at, one in enumerate(wrong)]]
 
     even = piece(0, 0, 0, 0)
-    assert compute.choices(readings, ["pair", "palm", "palm"], [piece(1, 0, 1, 1), piece(0, 1, 1, 0), even]) == (
-        readings[1],
-        readings[3],
-    )
-    assert compute.choices(readings, ["pair"], [even]) == (readings[1], readings[3])
+    found = [piece(1, 0, 1, 1), piece(0, 1, 1, 0), even]
+    assert compute.choices(readings, ["pair", "palm", "palm"], found, 1) == (readings[1], readings[3])
+    assert compute.choices(readings, ["pair"], [even], 1) == (readings[1], readings[3])
+    assert compute.choices(readings, ["pair"], [even], 2) == (*readings[1::-1], *readings[:1:-1])
 
 
 def judged(pitch_mm, count, low, high):
