@@ -145,9 +145,9 @@ def picture(lines: Iterable[dict[str, str]]) -> Figure:
         for entry in filter(lambda entry: panel is PANELS[1] and bound(by[entry]), by):
             least = max(float(line[panel.field]) for line in by[entry])
             axes.axhline(least, color=style.SOFT, ls="--", lw=1)
-            place = {"xytext": (0, -2), "textcoords": "offset points", "ha": "right", "va": "top"}
-            place |= {"xycoords": axes.get_yaxis_transform(), "fontsize": style.SMALL}
-            axes.annotate(f"{entry}: {least:.2f} mm", (0.99, least), **place)
+            below: Any = {"xytext": (0, -2), "textcoords": "offset points", "ha": "right", "va": "top"}
+            below |= {"xycoords": axes.get_yaxis_transform(), "fontsize": style.SMALL}
+            axes.annotate(f"{entry}: {least:.2f} mm", (0.99, least), **below)
     axes.set_xlabel("touch of the foam to the last byte, ms:\nmedian of all scenes (without USB)")
     marks = [Line2D([], [], color=row.color, marker=row.mark, lw=1, ms=6) for row in ROWS.values()]
     marks += [Line2D([], [], color=style.SOFT, marker="_", ls="", ms=7)]
