@@ -52,14 +52,14 @@ _ALL = (
         "clock",
         title="Board time on the host's clock, over simulated ways to the host",
         page="clock.md",
-        minutes=1,
+        minutes=0.5,
         sections=tables(accuracy=Section("tables:accuracy_table", sample="tables:slow_sample")),
     ),
     Study(
         "closed",
         title="Cost of labelling over the seam of a closed sheet",
         page="labelling.md",
-        minutes=1.5,
+        minutes=3,
         sections=tables(
             closed=Section("tables:clocks_table", sample="tables:clocks_sample"),
             closed_size=Section("tables:size_table", of_netlists=True),
@@ -88,7 +88,7 @@ _ALL = (
         "failures",
         title="One knob after another until something breaks",
         page="failures.md",
-        minutes=6,
+        minutes=6.5,
         sections=tables(failures=Section("tables:table"), unnoticed=Section("tables:unnoticed")),
         compute="tables:compute",
     ),
@@ -104,7 +104,7 @@ _ALL = (
         "flips",
         title="Flipped bits of the running gateware",
         page="flips.md",
-        minutes=5,
+        minutes=6.5,
         sections=tables(worst=Section("tables:worst_text"), flipped=Section("tables:designs_table")),
         compute="tables:compute",
         pictures="tables:draw",
@@ -127,7 +127,7 @@ _ALL = (
         "kits",
         title="The kits, from the finger to the host",
         page="kits.md",
-        minutes=4,
+        minutes=4.5,
         sections=tables(
             "times built",
             kits=Section("tables:headline", page="../README.md"),
@@ -160,7 +160,7 @@ _ALL = (
         "maker",
         title="The maker's sheet: diodes, pull-ups and series resistors",
         page="maker.md",
-        minutes=0.3,
+        minutes=0.2,
         sections=tables(
             diodes=Section("tables:diodes_table", sample="tables:diodes_table"),
             pulls=Section("tables:pulls_table", sample="tables:pulls_table"),
@@ -171,7 +171,7 @@ _ALL = (
         "mujoco",
         title="An arm with and without skin, and a sheet beside a momentum observer",
         page="mujoco.md",
-        minutes=0.5,
+        minutes=0.3,
         sections=tables(peaks=Section("clip:peaks_table")),
         extra="test",
     ),
@@ -232,15 +232,15 @@ _ALL = (
         "safety",
         title="Every electrical fault in the sheet",
         page="safety.md",
-        minutes=2,
+        minutes=1.5,
         sections=tables("coverage faults", times=Section("tables:times_table", sample="tables:times_table")),
     ),
-    Study("scenes", title="The built-in scenes", page="scenes.md", minutes=0.5, pictures="pictures:draw"),
+    Study("scenes", title="The built-in scenes", page="scenes.md", minutes=0.1, pictures="pictures:draw"),
     Study(
         "settle",
         title="Times that a sheet's circuit needs",
         page="settle.md",
-        minutes=1,
+        minutes=0.8,
         sections=tables(
             "needs breaks",
             shorted=Section("tables:shorted_table", sample="tables:shorted_table"),
@@ -252,7 +252,7 @@ _ALL = (
         "several",
         title="Cost of several sheets at one FPGA",
         page="several.md",
-        minutes=0.7,
+        minutes=1,
         sections=tables(
             several_line=Section("tables:line_table", sample="tables:line_sample"),
             several_told=Section("tables:told_table", sample="tables:told_sample"),
@@ -296,7 +296,7 @@ _ALL = (
         "tracking",
         title="Contacts followed over scenes and recordings",
         page="tracking.md",
-        minutes=6,
+        minutes=4.5,
         sections=tables(
             "speed reflex breaks scores ahead", recorded=Section("tables:recorded_table", needs=("../shared/data",))
         ),
@@ -310,6 +310,6 @@ _ALL = (
         minutes=0.1,
         sections=tables(units=Section("tables:units_table", sample="tables:units_table")),
     ),
-    Study("wave", title="One touch with its values", page="wave.md", minutes=0.5, pictures="pictures:draw"),
+    Study("wave", title="One touch with its values", page="wave.md", minutes=0.1, pictures="pictures:draw"),
 )
 STUDIES = {study.name: study for study in _ALL}
