@@ -93,7 +93,7 @@ LIGHT_US, LIGHT_N = 22.0, 0.2
 
 KITS_MM = 6.4
 ONE_N = (0.07, 0.1, 0.2, 0.4)
-THREE_N = ((0.07, 0.57, 1.13), (0.07, 0.57, 2.26), (0.1, 0.4, 1.6), (0.2, 1.6, 3.2))
+THREE_N = ((0.07, 0.57, 1.13), (0.07, 0.57, 2.26), (0.07, 0.57, 2.26), (0.2, 1.6, 3.2))
 SOFT, SOFT_N = "soft kit", (0.13, 0.53, 1.74)
 """The kits' pitch; the best one level and three levels by pitch; the entry with the levels of the soft kit."""
 

@@ -57,7 +57,7 @@ ROWS = {
     "three levels, by pitch": Row(
         style.VERMILLION, "D", _pitches("three levels"), (-6, 0), {"4": (0, -10), "8": (4, 8)}
     ),
-    "three levels of the soft kit": Row(style.VERMILLION, "s", {"soft": "soft kit"}, (-15, 0)),
+    "three levels of the soft kit": Row(style.VERMILLION, "s", {"soft": "soft kit"}, (-1, 12)),
     "analog array at 6.4 mm (model)": Row(style.BROWN, "v", {"array": "analog array"}, (-2, -10)),
     "microcontroller, OpenCV (models)": Row(style.SKY, "P", {"MCU, OpenCV": "microcontroller", "": "OpenCV"}, (1, -20)),
 }
