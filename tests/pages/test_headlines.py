@@ -116,6 +116,10 @@ def test_a_late_stop_or_none_costs_no_more_than_under_the_papers_sheet():
 @pytest.mark.parametrize("page", ["kits.md", "safety.md"])
 def test_pages_say_what_a_late_stop_costs_with_the_starter_kit(page):
     text = " ".join((ROOT / "docs" / page).read_text().split())
-    said = re.findall(r"from ([\d.]+) to ([\d.]+) N on a (forearm|rigid)", text)
+    said = re.findall(r"from ([\d.]+)( N \(95 %\))? to ([\d.]+)( N \(95 %\))? N on a (forearm|rigid)", text)
     found = ((body, [peaks("starter", body)[way].split(" / ")[0] for way in ("UART", "6 ms")]) for body in BODIES)
-    assert said == [(*numbers, body) for body, numbers in found]
+    for (first, part, last, other, where), (body, (uart, late)) in zip(said, found, strict=True):
+        assert where == body
+        for number, quantile, worst in ((first, part, uart), (last, other, late)):
+            assert worst.startswith(f"95 %: {number} " if quantile else number)
+            assert quantile or worst == number

@@ -32,7 +32,7 @@ SPREAD = 0.1
 """Standard deviations of the logarithms of a fold's force and of its share on each cell, from fold to fold."""
 MOVED_MM = 1.0
 """Standard deviation of the crease's place, from fold to fold."""
-SWEEPS, SHEETS = 20, 5
+SWEEPS, SHEETS = 20, 50
 """Folds that are learned, and sheets drawn."""
 FINGER_MM, TOUCH_N = 9.0, 5.0
 
