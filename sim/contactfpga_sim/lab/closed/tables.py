@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
-from contactfpga_sim.apps import size
+from contactfpga_sim.apps import pool, size
 from contactfpga_sim.lab import writer
 from contactfpga_sim.model.golden import volume
 
@@ -36,9 +37,12 @@ def clocks_table() -> str:
 def size_table() -> str:
     sheets = ("open", "open, extents", "closed", "closed, extents")
     head = ["labeller", "connectivity", *(f"{lines}x{lines}: {sheet}" for lines in (16, 32) for sheet in sheets)]
-    rows = [[*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
-            for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
-    return writer.table_of([head, *rows])
+    with pool.executor() as workers:
+        return writer.table_of([head, *workers.map(_sizes, *zip(*itertools.product(CLOSED, (8, 4))))])
+
+
+def _sizes(labeller: Labeller, connectivity: int) -> list[str]:
+    return [*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
 
 
 def names(labeller: Labeller, connectivity: int) -> tuple[str, str]:
