@@ -38,10 +38,12 @@ def size_table() -> str:
     sheets = ("open", "open, extents", "closed", "closed, extents")
     head = ["labeller", "connectivity", *(f"{lines}x{lines}: {sheet}" for lines in (16, 32) for sheet in sheets)]
     with pool.executor() as workers:
-        return writer.table_of([head, *workers.map(_sizes, *zip(*itertools.product(CLOSED, (8, 4))))])
+        closed = [name for name, labeller in LABELLERS.items() if labeller.closed]
+        return writer.table_of([head, *workers.map(_sizes, *zip(*itertools.product(closed, (8, 4))))])
 
 
-def _sizes(labeller: Labeller, connectivity: int) -> list[str]:
+def _sizes(name: str, connectivity: int) -> list[str]:
+    labeller = LABELLERS[name]
     return [*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
 
 
