@@ -31,7 +31,7 @@ class _Slots:
 
     @property
     def begins_guard(self) -> Value:
-        """The guard row's slot does, by whose ruler the rows after it are sampled."""
+        """Whether the guard row's slot begins. Its ruler sets the samples of the rows that follow."""
         return self.following[0] & (self.clock == 0)
 
     @property
@@ -271,8 +271,8 @@ class Scanner(wiring.Component):
         started = Signal()
         with m.If(slots.is_last):
             m.d.sync += started.eq(1)
-        # What comes while columns are shifted in came after their sample: it asks for the next frame. Where the sample
-        # moves so does what comes after the clock in which it is set.
+        # A request that comes while columns are shifted in came after their sample, so it asks for the next frame.
+        # Where commands move the sample, so does a request that comes once the sample's clock is fixed.
         moves = moves_sample(self.derived)
         if moves:
             begins = slots.begins_guard if self.skin.ruler else slots.begins_rows

@@ -59,7 +59,7 @@ _ALL = (
         "closed",
         title="Cost of labelling over the seam of a closed sheet",
         page="labelling.md",
-        minutes=2,
+        minutes=2.5,
         sections=tables(
             closed=Section("tables:clocks_table", sample="tables:clocks_sample"),
             closed_size=Section("tables:size_table", of_netlists=True),

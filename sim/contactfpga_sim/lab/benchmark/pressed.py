@@ -148,7 +148,7 @@ class Contact:
             answer -= answer[touch].mean()
             if size:
                 step = (gap * along)[touch].sum() / (answer * along)[touch].sum()
-            else:  # a patch that touches alone says nothing of the others' stiffness but its own
+            else:  # One patch has no differences of gaps, so its own stiffness gives the step.
                 step, size = force_n / self.moved(force).max(), 1.0
             new = np.maximum(0, np.where(touch, force - step * along, 0))
             met = (new == 0) & (gap < 0)

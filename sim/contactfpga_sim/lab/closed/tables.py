@@ -15,7 +15,7 @@ from contactfpga_sim.apps import pool, size
 from contactfpga_sim.lab import writer
 from contactfpga_sim.model.golden import volume
 
-CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
+CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
 COLUMNS = 8
 """Columns whose last two rows are all tried."""
 AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
@@ -30,7 +30,7 @@ def clocks_table() -> str:
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
     bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))
-            for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
+            for labeller in map(LABELLERS.__getitem__, CLOSED) for connectivity in (8, 4)]  # fmt: skip
     return writer.table_of([(*head, *bounds), *rows])
 
 
@@ -38,8 +38,7 @@ def size_table() -> str:
     sheets = ("open", "open, extents", "closed", "closed, extents")
     head = ["labeller", "connectivity", *(f"{lines}x{lines}: {sheet}" for lines in (16, 32) for sheet in sheets)]
     with pool.executor() as workers:
-        closed = [name for name, labeller in LABELLERS.items() if labeller.closed]
-        return writer.table_of([head, *workers.map(_sizes, *zip(*itertools.product(closed, (8, 4))))])
+        return writer.table_of([head, *workers.map(_sizes, *zip(*itertools.product(CLOSED, (8, 4))))])
 
 
 def _sizes(name: str, connectivity: int) -> list[str]:
